@@ -62,6 +62,16 @@ def test_what_systems_put_beside_videos_is_none_of_them(monkeypatch: pytest.Monk
     assert many.sources_in("clips") == before
 
 
+@pytest.mark.parametrize("said", ["{}", '{"name": "a page", "icons": []}', "[", "\0"])
+def test_a_manifest_of_something_else_makes_no_recording(said: str) -> None:
+    """Neither of a folder of pictures, nor of one that has a folder `raw`."""
+    shutil.copytree("clips/pictures", "clips/raw")
+    for folder in ("clips", "clips/pictures"):
+        Path(folder, "manifest.json").write_text(said)
+    assert {"clips/pictures", "clips/raw"} < {*many.sources_in("clips")}
+    assert vid2ev("clips/pictures", "clips/raw", "-o", "out").exit_code == 0
+
+
 def test_a_name_longer_than_that_of_any_file_may_be_a_scene() -> None:
     Path("images.toml").write_text("[scene]\nduration_s = 0.01\n[camera]\nsize = [8, 6]\n")
     scene = f"scene:images.toml,{','.join(['background=0.5'] * 30)}"

@@ -89,6 +89,15 @@ def read_manifest(path: Path) -> dict[str, Any]:
     return manifest
 
 
+def is_recording(folder: Path) -> bool:
+    """Whether a folder is a recording, by its manifest; others have files of that name, too."""
+    try:
+        read_manifest(folder / "manifest.json")
+    except DataError:
+        return False
+    return True
+
+
 @contextmanager
 def as_stated(path: Path) -> Iterator[None]:
     """What a manifest or a journal lacks, or has of another kind, becomes one sentence: DataError."""

@@ -15,7 +15,7 @@ from vid2ev.errors import UsageError, check_names
 from vid2ev.formats import recognise
 from vid2ev.physics.bayer import check_pattern
 from vid2ev.recording import exposures
-from vid2ev.recording.manifest import identity, versions
+from vid2ev.recording.manifest import identity, is_recording, versions
 from vid2ev.requests import names_in
 from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
 from vid2ev.rig.depth import plane_of
@@ -272,7 +272,7 @@ def plain(facts: dict[str, Any]) -> dict[str, Any]:
 def holds_adc_codes(path: Path) -> bool:
     """Whether it is the folder of a frame camera's codes."""
     folder = path.absolute()  # (one may be in it)
-    return folder.name == RAW and (folder.parent / "manifest.json").is_file()
+    return folder.name == RAW and is_recording(folder.parent)
 
 
 def refuse_recordings(path: Path, transfer: str = "auto") -> None:
@@ -284,7 +284,7 @@ def refuse_recordings(path: Path, transfer: str = "auto") -> None:
             f"{path} holds codes of a sensor's ADC, not pictures; --cis-out png makes frames/, which can be converted,"
             " --transfer linear takes the codes for light"
         )
-    if (path / "manifest.json").is_file():
+    if is_recording(path):
         if (path / "frames").is_dir():
             raise UsageError(f"{path} is a recording already; its frames can be converted: {path / 'frames'}")
         raise UsageError(

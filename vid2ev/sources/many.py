@@ -8,6 +8,7 @@ from pathlib import Path
 from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
 from vid2ev.light.recognise import head_of, natural, pictures_in
+from vid2ev.recording.manifest import is_recording
 from vid2ev.untrusted import read_lines
 
 CLIPS = {
@@ -30,14 +31,15 @@ def sources_in(video: str) -> list[str]:
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not os.path.isdir(video) or _is_recording(folder):  # (Path's raise OSError for long names)
+    if video == "-" or not os.path.isdir(video) or is_recording(folder):  # (Path's raise OSError for long names)
         return [video]
     held = [path for path in folder.iterdir() if not path.name.startswith(".")]
     clips = [path for path in held if _is_clip(path)]
     films = sum(path.suffix.lower() not in ARRAYS for path in clips)
     if len(pictures_in(folder)) > films:  # (if they are no more, they are covers and stills of these)
         return [video]
-    folders = [path for path in held if _may_be_read(path) and holds_pictures(path) and not _is_recording(path)]
+    # (of recordings that were made before, perhaps into the folder of their videos, pictures are of probed pixels)
+    folders = [path for path in held if _may_be_read(path) and holds_pictures(path) and not is_recording(path)]
     found = sorted(clips + folders, key=lambda path: natural(path.name))
     return [str(path) for path in found] or [video]
 
@@ -49,11 +51,6 @@ def _is_clip(path: Path) -> bool:
 def _may_be_read(path: Path) -> bool:
     """Whether it is a folder, and not one of the system's own."""
     return path.is_dir() and os.access(path, os.R_OK | os.X_OK)
-
-
-def _is_recording(folder: Path) -> bool:
-    """Whether it was made before, perhaps into the folder of its video; there may be pictures in it, of its pixels."""
-    return (folder / "manifest.json").exists()
 
 
 def holds_pictures(folder: Path) -> bool:
