@@ -7,6 +7,8 @@ import json
 import os
 import pickle
 import struct
+import subprocess
+import sys
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -106,6 +108,19 @@ def test_a_limit_that_is_no_number_is_a_mistake_of_who_set_it(monkeypatch: pytes
     monkeypatch.setenv(LARGEST, "much")
     with pytest.raises(UsageError, match="whole number of megabytes"):
         most_bytes()
+
+
+@pytest.mark.parametrize("limit", ["much", "9" * 9, "9" * 10, "9" * 40, "9" * 5000])
+def test_no_limit_ends_the_program_without_a_sentence(tmp_path: Path, limit: str) -> None:
+    np.save(tmp_path / "a.npy", np.zeros((2, 8, 8), np.float32))
+    command = [sys.executable, "-m", "vid2ev", "convert", str(tmp_path / "a.npy"), "--fps", "9", "--dry-run"]
+    limited = {name: value for name, value in os.environ.items() if not name.startswith("OPENCV")} | {LARGEST: limit}
+    assert subprocess.run([sys.executable, "-c", "import vid2ev, cv2"], env=limited, timeout=100).returncode == 0
+    done = subprocess.run(command, env=limited, capture_output=True, text=True, timeout=100)
+    if limit == "9" * 9:
+        assert done.returncode == 0
+    else:
+        assert done.returncode == 2 and done.stderr.startswith(f"error: {LARGEST}=") and done.stderr.count("\n") == 1
 
 
 def test_pictures_that_claim_too_much_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

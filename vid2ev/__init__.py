@@ -71,9 +71,11 @@ _HOME = {
 __all__ = ["__version__", *_HOME]
 
 # OpenCV reads this once, when it is loaded: pictures of more pixels than `vid2ev.untrusted` allows are refused before
-# there is memory for them (16 bytes for a pixel).
+# there is memory for them (16 bytes for a pixel).  Of a number that it could not hold it would end the program; what is
+# no limit is refused by `most_bytes`.
 _MEGABYTES = os.environ.get("VID2EV_LARGEST_MB", "")
-os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(int(_MEGABYTES if _MEGABYTES.isdecimal() else 4096) << 16))
+_ALLOWED = int(_MEGABYTES) if _MEGABYTES.isdecimal() and len(_MEGABYTES) <= 9 else 4096
+os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_ALLOWED << 16))
 
 
 def __getattr__(name: str) -> Any:
