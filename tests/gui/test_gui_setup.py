@@ -474,9 +474,9 @@ def test_pages_of_others_are_not_served(host: str, origin: str, status: int) -> 
         sent.append(message)
 
     headers = [(b"host", host.encode()), *([(b"origin", origin.encode())] if origin else [])]
-    for served in ("127.0.0.1", "localhost", "127.0.0.2", "::1"):
+    for served in ("127.0.0.1", "localhost", "127.0.0.2", "::1", "LocalHost"):
         asyncio.run(Guard(page, served)({"type": "http", "headers": headers}, None, send))
-    assert [message["status"] for message in sent if "status" in message] == 4 * [status]
+    assert [message["status"] for message in sent if "status" in message] == 5 * [status]
 
 
 @pytest.mark.parametrize("error", [RuntimeError("No response returned."), KeyError("REQUEST_METHOD")])

@@ -35,7 +35,7 @@ class Guard:
 def is_loopback(host: str) -> bool:
     """Whether a host is this machine alone: localhost, or an address such as 127.0.0.1."""
     try:
-        return host == "localhost" or ip_address(host).is_loopback
+        return host.lower() == "localhost" or ip_address(host).is_loopback
     except ValueError:
         return False
 
