@@ -79,7 +79,7 @@ def main(clip, budget, sensor, duration, size, fps, repeats, threads, cpu, outpu
 
     cost = measured(
         clip, budget=budget, sensor=sensor, duration_s=duration, size=size, fps=fps, repeats=repeats, threads=threads,
-        report=report, clock=time.process_time if cpu else time.perf_counter,
+        report=report, clock=time.process_time if cpu else time.perf_counter, given=["size"] * (size is not None),
     )  # fmt: skip
     plot(cost, output)
     if into is not None:

@@ -13,6 +13,8 @@ from click.testing import CliRunner
 from matplotlib.image import imread
 from moving_texture import texture
 
+from vid2ev.commands.cost import cost
+
 ROOT = Path(__file__).parents[2]
 PAGE = """# A page
 
@@ -60,6 +62,15 @@ def test_the_table_goes_into_its_section(example: ModuleType, tmp_path: Path) ->
     assert len({row.count(" | ") for row in rows}) == 1
     assert sum("→" in row for row in rows) == 1 and any(row.startswith("**") for row in rows)
     assert imread(tmp_path / "cost.png").shape[:2] == (600, 950)
+
+
+def test_a_size_that_is_given_stays_as_by_the_command(example: ModuleType, tmp_path: Path) -> None:
+    common = [texture(tmp_path, frames=5), "--sensor", "ideal", "--repeats", "1", "--threads", "1", "--fps", "50"]
+    with contextlib.chdir(tmp_path):
+        for size in ([], ["--size", "48x32"]):
+            shown = CliRunner().invoke(example.main, [*common, *size], catch_exceptions=False).output
+            told = CliRunner().invoke(cost, [*common, *size, "--overwrite"], catch_exceptions=False).output
+            assert ("half the size" in shown) == ("half the size" in told) == (not size)
 
 
 def test_a_page_without_such_a_section_is_refused(example: ModuleType) -> None:
