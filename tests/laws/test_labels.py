@@ -24,6 +24,7 @@ def moving() -> tuple[np.ndarray, np.ndarray]:
         ({"leak_rate_hz": 10}, Label.LEAK),
         ({"leak_rate_hz": 10, "random_phase": True}, Label.LEAK),
         pytest.param({"leak_rate_hz": 10, "timing": "linear"}, Label.LEAK, marks=pytest.mark.long),
+        ({"leak_rate_hz": 200, "timing": "frame"}, Label.LEAK),  # (four at once)
         ({"shot_rate_hz": 10}, Label.SHOT),
         ({"hot_probability": 0.2, "hot_rate_hz": 100}, Label.HOT),
     ],

@@ -128,9 +128,12 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
         t_ns = iv.t0_ns + np.int64(when_ns)
         label = np.int64(lanes[LABEL + j]) if len(flags.labels) else np.int64(SIGNAL)
         if len(flags.labels) and len(flags.leak):
-            if label == SIGNAL and polarity == 1 and mostly_leak(t_ns - t_reset[pixel], pixel, planes, num):
-                label = np.int64(LEAK)
-            t_reset[pixel] = t_ns
+            leaked_ns, whole_ns = np.float64(t_ns - t_reset[pixel]), leak_of_threshold_ns(pixel, planes, num)
+            leaks = (label == SIGNAL) & (polarity == 1) & (leaked_ns > 0.5 * whole_ns)
+            label = np.int64(LEAK) if leaks else label
+            # (where all events of an interval come at its end, what has leaked until then makes several)
+            left_ns = max(leaked_ns - whole_ns, 0.0) if leaks & num.frame_time else 0.0
+            t_reset[pixel] = t_ns - np.int64(left_ns)
         key = key_of(when_ns, pixel, polarity, label, iv)
         if num.refractory_ns > 0:
             blind = t_ns - t_last[pixel] < num.refractory_ns
@@ -143,10 +146,10 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
 
 
 @inner
-def mostly_leak(since_ns, pixel, planes, num):
-    """Whether the leak makes more than half of the way to the pixel's mean ON level in this time."""
+def leak_of_threshold_ns(pixel, planes, num):
+    """How long the leak takes to the pixel's mean ON level [ns]: an event to which it has come half-way is its own."""
     threshold = np.float64(planes.theta[pixel, 0]) if num.mismatch > 0.0 else num.threshold_on
-    return num.leak_nat_per_ns * np.float64(since_ns) > 0.5 * threshold
+    return threshold / num.leak_nat_per_ns
 
 
 @inner
