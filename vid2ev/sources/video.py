@@ -68,7 +68,10 @@ class Video:
         self._coded_size = (first.width, first.height)
         self.size = self._coded_size if not self._orientation[0] else self._coded_size[::-1]
         if first.interlaced_frame:
-            self.warnings.append("interlaced video: both fields of a frame are taken for one instant")
+            self.warnings.append(
+                "interlaced video: both fields of a frame are taken for one instant; ffmpeg -i VIDEO -vf bwdif makes a"
+                " picture of each"
+            )
         self.warnings += self._not_square()
         self._zero_s = stamp_of(first) or Fraction(0) if footage.kind == "camera" else Fraction(0)
         self._about = self._describe(first)
