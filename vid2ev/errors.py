@@ -63,8 +63,12 @@ def read_as(
 
 
 def _quoted(message: str) -> str:
-    message = re.sub(r"[\x00-\x1f\x7f-\x9f]+", " ", message)
-    return re.sub(r"\S{200,}", lambda word: f"{word[0][:80]}...{word[0][-40:]}", message)
+    return re.sub(r"\S{200,}", lambda word: f"{word[0][:80]}...{word[0][-40:]}", plain(message))
+
+
+def plain(text: str) -> str:
+    """A text without control characters."""
+    return re.sub(r"[\x00-\x1f\x7f-\x9f]+", " ", text)
 
 
 def nearest(word: str, words: Iterable[str]) -> str:

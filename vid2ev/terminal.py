@@ -9,18 +9,19 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
+from vid2ev.errors import plain
+
 if TYPE_CHECKING:
     from tqdm import tqdm
 
 NAME = 10  # width of the names
-CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 COMPILING = "compiling kernels, once"  # it takes seconds to minutes
 SELDOM_S, MORE = 10.0, 0.1  # between lines of a log at least, and of the time that is gone
 
 
 def lines(facts: Iterable[tuple[str, str]]) -> str:
     """Facts under each other, their names in a column; without control characters, as they may be quoted of files."""
-    facts = [(CONTROL.sub(" ", name), CONTROL.sub(" ", str(text))) for name, text in facts]
+    facts = [(plain(name), plain(str(text))) for name, text in facts]
     width = max(NAME, *(len(name) + 1 for name, _ in facts))
     return "\n".join(f"{name:<{width}}{text}" for name, text in facts)
 
