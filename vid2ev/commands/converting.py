@@ -24,6 +24,7 @@ def convert_one(
     from vid2ev.commands.progress import bar, given, kept
     from vid2ev.interrupts import heard
     from vid2ev.making import conversion
+    from vid2ev.sources import is_live
     from vid2ev.terminal import lines
 
     budget, limits = options["budget"], None
@@ -40,7 +41,7 @@ def convert_one(
                 click.echo(f"then with the fastest setting within the budget {budget}, by `vid2ev cost`")
         if dry_run:
             return recipe
-    live = _passes(video)
+    live = is_live(video)
     with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
@@ -52,8 +53,9 @@ def convert_one(
 def check_shared(video: str, directory: Path, overwrite: bool, resume: bool) -> None:
     """Raise UsageError for what no worker need try."""
     from vid2ev.recording.folder import check_free
+    from vid2ev.sources import is_live
 
-    if _passes(video):
+    if is_live(video):
         raise UsageError(f"{video} passes once, here; leave --jobs and --scheduler out")
     check_free(directory, overwrite, resume, video)
 
@@ -95,6 +97,7 @@ def _within(
     from vid2ev.cost.ladder import Given
     from vid2ev.making.split import begun_part
     from vid2ev.recording.folder import begun_job, check_free
+    from vid2ev.sources import is_live
     from vid2ev.tracks.outputs import Outputs
 
     check_free(directory, options["overwrite"], options["resume"], video)
@@ -102,7 +105,7 @@ def _within(
     begun = job.get("budget", {})
     choice = taken_up(begun, budget, Given(options, named))
     if choice is None:
-        if not _passes(video):
+        if not is_live(video):
             checked(video, directory, options, Budget.parse(budget))
         rest = dict(options)
         Outputs.taken_from(rest)
@@ -112,8 +115,3 @@ def _within(
     if not quiet:
         click.echo(choice.line)
     return choice.rung.applied(options) | {"notes": {"budget": choice.note}}
-
-
-def _passes(video: str) -> bool:
-    """Whether a video is live."""
-    return video == "-" or video.startswith("camera:")

@@ -21,7 +21,7 @@ from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.source import Request, parse_request, rig_of_scene
 from vid2ev.seen.recipe import refuse_recordings
 from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile
-from vid2ev.sources import CAMERA_PREFIX, SCENE_PREFIX, STANDARD_INPUT, check_there, is_scene
+from vid2ev.sources import SCENE_PREFIX, check_there, is_live, is_scene
 from vid2ev.toml_text import toml_value
 
 PRESET = "paper"  # of cameras that name no sensor
@@ -143,7 +143,7 @@ def setup_of(source: str, rig: str | None = None) -> Setup:
     needs other options is not seen here."""
     if not source:
         raise UsageError("no source is named; enter a video, a folder of images, or a scene such as scene:room")
-    if source == STANDARD_INPUT or source.startswith(CAMERA_PREFIX):
+    if is_live(source):
         raise UsageError(f"{source} passes once and cannot be looked at here and there; give a file")
     check_there(source)
     named = rig_of_scene(source.removeprefix(SCENE_PREFIX)) if is_scene(source) else None

@@ -103,7 +103,7 @@ def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colo
         return _synthetic(name, transfer, fps, colour)
     if is_scene(name):
         return _scene(name.removeprefix(SCENE_PREFIX), transfer, fps, colour)
-    if name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX):
+    if is_live(name):
         from vid2ev.sources.live import open_camera, open_standard_input
         from vid2ev.sources.video import Video
 
@@ -189,9 +189,14 @@ def is_scene(name: str) -> bool:
     return name.startswith(SCENE_PREFIX) or (name.endswith(".toml") and os.path.isfile(name))
 
 
+def is_live(name: str) -> bool:
+    """Whether a source passes once: standard input, or a camera."""
+    return name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX)
+
+
 def check_there(name: str) -> None:
     """Raise UsageError for a source that is a file or a folder, and is not there."""
-    if not name.startswith((SYNTHETIC_PREFIX, SCENE_PREFIX, CAMERA_PREFIX)) and name != STANDARD_INPUT:
+    if not name.startswith((SYNTHETIC_PREFIX, SCENE_PREFIX)) and not is_live(name):
         _existing(Path(name))
 
 

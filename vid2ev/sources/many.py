@@ -9,6 +9,7 @@ from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
 from vid2ev.light.recognise import head_of, natural, pictures_in
 from vid2ev.recording.manifest import is_recording
+from vid2ev.sources import is_live
 from vid2ev.untrusted import read_lines
 
 CLIPS = {
@@ -31,7 +32,7 @@ def sources_in(video: str) -> list[str]:
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not os.path.isdir(video) or is_recording(folder):  # (Path's raise OSError for long names)
+    if is_live(video) or not os.path.isdir(video) or is_recording(folder):  # (Path's raise OSError for long names)
         return [video]
     held = [path for path in folder.iterdir() if not path.name.startswith(".")]
     clips = [path for path in held if _is_clip(path)]
