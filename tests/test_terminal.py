@@ -59,6 +59,18 @@ def test_nothing_is_said_of_quiet_work(monkeypatch):
     assert log.getvalue() == ""
 
 
+@pytest.mark.parametrize("is_terminal", [True, False])
+@pytest.mark.parametrize("unlike_the_environment", [{}, {"disable": False}])
+def test_the_environment_switches_off_bars_and_lines(monkeypatch, is_terminal, unlike_the_environment):
+    clock, shown = Clock(monkeypatch), io.StringIO()
+    monkeypatch.setattr(shown, "isatty", lambda: is_terminal)
+    monkeypatch.setattr(sys, "stderr", shown)
+    with bar_of(False, STEPS, total=2, **unlike_the_environment) as bar:
+        clock.now_s += 100.0
+        bar.refresh()
+    assert (shown.getvalue() != "") == bool(unlike_the_environment)
+
+
 @pytest.mark.parametrize("stderr", ["closed", "none"])
 def test_work_goes_on_where_nobody_reads_its_log(monkeypatch, stderr):
     class Closed(io.StringIO):

@@ -32,12 +32,14 @@ def counted(count: int, name: str) -> str:
 
 
 def bar_of(quiet: bool, bar_format: str, **look: Any) -> tqdm:
-    """A progress bar on a terminal; where that is none, as in the log of a cluster, a line of the same now and then,
-    but for TQDM_DISABLE=1 in the environment."""
+    """A progress bar on a terminal; where that is none, as in the log of a cluster, a line of the same now and then.
+    Neither with TQDM_DISABLE=1 in the environment."""
     from tqdm import tqdm
 
-    if quiet or sys.stderr is None or sys.stderr.isatty():
-        return tqdm(bar_format=bar_format, leave=False, disable=quiet or sys.stderr is None, **look)
+    if quiet or sys.stderr is None:
+        return tqdm(disable=True)
+    if sys.stderr.isatty():
+        return tqdm(bar_format=bar_format, leave=False, **look)
     told = re.sub(r" {bar(:\d+)?}", "", bar_format)
     return tqdm(bar_format=told, leave=False, file=Log(sys.stderr), mininterval=1.0, **look)
 
