@@ -185,6 +185,36 @@ def test_a_dry_run_refuses_what_workers_would(sentence: str, video: str, argumen
     assert result.exit_code == 2 and "camera:0 passes once" in result.stderr and left() == set()
 
 
+@pytest.mark.parametrize("is_finished", [True, False])
+@pytest.mark.parametrize("begun", [["--seed", "7"], ["--seed", "random"], ["--effects", "auto"], ["--format", "csv"]])
+def test_a_dry_run_resumes_and_refuses_what_the_run_does(
+    begun: list[str], is_finished: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    arguments = ["convert", CLIP, "-o", "out", *QUICK]
+    with monkeypatch.context() as patch:
+        if not is_finished:
+            patch.setitem(conversion.convert.__kwdefaults__, "piece", 1)
+            patch.setattr("vid2ev.tracks.recorder.Recorder.finish", interrupt)
+        assert vid2ev(*arguments, *begun, "-q").exit_code == (0 if is_finished else 130)
+    seed = json.loads(Path("out/manifest.json" if is_finished else "out.partial/job.json").read_text())["seed"]
+    for now in (["--seed", "8"], ["--effects", "none"], ["--labels"], begun):
+        foretold = vid2ev(*arguments, *now, "--resume", "--dry-run")
+        made = vid2ev(*arguments, *now, "--resume", "-q")
+        assert (foretold.exit_code, foretold.stderr) == (made.exit_code, made.stderr)
+        assert (made.exit_code == 0) == (now == begun)
+    assert f"seed {seed}\n" in foretold.stdout and ("left as it is" in foretold.stdout) == is_finished
+
+
+def test_a_dry_run_refuses_to_resume_what_passes_once(tmp_path: Path) -> None:
+    film = write_video(tmp_path / "clip.mkv").read_bytes()
+    for more in ([], ["--dry-run"]):
+        result = CliRunner().invoke(main, ["convert", "-", "--resume", *more], input=film)
+        assert result.exit_code == 2 and "cannot be taken up again" in result.stderr
+
+
 def test_a_dry_run_says_that_effects_are_left_to_the_light() -> None:
     assert "those that the light calls for" in vid2ev("convert", CLIP, "--effects", "auto", "--dry-run").stdout
 

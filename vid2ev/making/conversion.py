@@ -16,7 +16,7 @@ from typing import Any
 from vid2ev.cluster.task import share_of
 from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError, check_names
-from vid2ev.plan.plan import TOLERANCE, check_tolerance
+from vid2ev.plan.plan import TOLERANCE, Plan, check_tolerance
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import described, planned
 from vid2ev.recording.folder import Folder, begun_job, check_free
@@ -113,7 +113,7 @@ def convert(
     if not is_whole(piece, 1):
         raise UsageError(f"piece {piece!r}: expected a whole number of pixel-steps, of at least 1; leave it out")
     if seed is None:
-        seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
+        seed = begun_seed(directory, resume, secrets.randbits(32))
     outputs = Outputs.of(**Outputs.taken_from(rest))
     check_free(directory, overwrite, resume, video)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
@@ -125,10 +125,9 @@ def convert(
         raise UsageError("effects auto of a recording that begins after its light, which is not looked at; name them")
     planner = Planner(recipe, tolerance, threads, where) if effects == "auto" else None
     recipe, plans = (recipe, {}) if planner else planned(recipe, effects, tolerance)
-    if resume and not recipe.source.rewindable:
-        raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
-    job = _asked(recipe, tolerance) if planner else recipe.describe() | described(plans)
-    job |= {"outputs": outputs.describe()} | plain({**(notes or {})})
+    if resume:
+        check_twice(recipe)
+    job = job_of(recipe, outputs, tolerance if planner else None, plans, notes)
     job |= {} if part == WHOLE else {"part": list(part)}
     job |= {} if since_ns is None else {"since_ns": since_ns}
     beside = growing(recipe, outputs)
@@ -163,6 +162,17 @@ def telling(tell: Callable[[Mapping[str, Any]], object]) -> Report:
 def default_directory(video: str | Path) -> Path:
     """Where the recording of a video goes if nothing else is said."""
     return Path(f"{short_name(str(video))}_events")
+
+
+def begun_seed(directory: Path, resume: bool, drawn: Any) -> Any:
+    """The seed of a recording that is given none: that of what is there if it goes on, or else what was drawn."""
+    return (begun_job(directory) if resume else {}).get("seed", drawn)
+
+
+def check_twice(recipe: Recipe) -> None:
+    """Raise UsageError for a source that cannot be read again, as one has to be to go on."""
+    if not recipe.source.rewindable:
+        raise UsageError(f"{recipe.video} passes once and cannot be taken up again; leave --resume out")
 
 
 def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
@@ -211,11 +221,20 @@ def _manifests(job: dict[str, Any], recorder: Recorder, run: dict[str, Any]) -> 
     return {"": job | {"results": results, "run": run}, **manifests}
 
 
-def _asked(recipe: Recipe, tolerance: float) -> dict[str, Any]:
-    """What decides a recording whose effects are chosen by its light: the sensors as they were before."""
-    said = recipe.describe()
-    sensors = {key: said.pop(key) for key in ("sensor", "cameras") if key in said}
-    return said | {"asked": {"effects": "auto", "tolerance": tolerance} | sensors}
+def job_of(
+    recipe: Recipe,
+    outputs: Outputs,
+    tolerance: float | None,
+    plans: Mapping[str, Plan],
+    notes: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """What decides a recording, as JSON; where effects are chosen by its light, within a tolerance, the sensors as they
+    were before."""
+    said = recipe.describe() | described(plans)
+    if tolerance is not None:
+        sensors = {key: said.pop(key) for key in ("sensor", "cameras") if key in said}
+        said |= {"asked": {"effects": "auto", "tolerance": tolerance} | sensors}
+    return said | {"outputs": outputs.describe()} | plain({**(notes or {})})
 
 
 def _recorded(

@@ -177,15 +177,16 @@ class Folder:
 
     def _begin(self) -> None:
         """Take up the checkpoint, find the recording finished, or start."""
-        made, sizes = self.directory / "manifest.json", dict[str, int]()
-        if self.resume and self.resumable and self._is_same(self.partial / "job.json"):
+        sizes = dict[str, int]()
+        begun = taken_up(self.directory, self.job, self.overwrite) if self.resume else None
+        if begun and begun.parent == self.partial:
             shutil.rmtree(self.partial / "whole", ignore_errors=True)  # (perhaps the recording that was replaced)
             saved = self.saved()
             with self.taking_up():
                 sizes = {name[5:]: int(saved[name]) for name in saved if name.startswith("size.")}
                 self._check_sizes(sizes)
-        elif self.resume and not self.resumable and made.exists() and self._is_same(made):
-            self.finished = read_manifest(made)
+        elif begun:
+            self.finished = read_manifest(begun)
             return
         else:
             self._clear()
@@ -214,15 +215,20 @@ class Folder:
             file.truncate(sizes.get(name, 0))
             file.seek(0, os.SEEK_END)
 
-    def _is_same(self, path: Path) -> bool:
-        return is_of_job(path, self.job, self.directory, self.overwrite)
-
     def _clear(self) -> None:
         """Remove all but the lock: first what could be gone on from, last what says whose folder it is."""
         (self.partial / "checkpoint.npz").unlink(missing_ok=True)
         for path in sorted(self.partial.iterdir(), key=lambda path: path.name == "job.json"):
             if path.name != LOCK:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def taken_up(directory: Path, job: Mapping[str, Any], overwrite: bool) -> Path | None:
+    """What a conversion that resumes finds of its job: that of the last checkpoint, the manifest of a finished
+    recording, or nothing.  Raises UsageError for another job's unless it may be overwritten."""
+    begun, made = partial_of(directory) / "job.json", directory / "manifest.json"
+    found = begun if begun.with_name("checkpoint.npz").exists() else made if made.exists() else None
+    return found if found and is_of_job(found, job, directory, overwrite) else None
 
 
 def begun_job(directory: Path) -> dict[str, Any]:
