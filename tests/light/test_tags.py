@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from vid2ev.errors import DataError
-from vid2ev.light.tags import MATRICES, is_full_range, matrix_of, tag_of, transfer_of
+from vid2ev.light.tags import MATRICES, UNSPECIFIED, is_full_range, matrix_of, tag_of, transfer_of
 
 
 @pytest.mark.parametrize("tag", [0, 2])
@@ -35,6 +35,6 @@ def test_the_flag_of_the_range_counts_and_without_it_the_format(pixels: str) -> 
 def test_a_transfer_that_is_asked_for_counts_and_then_the_tag() -> None:
     assert [transfer_of(16, asked) for asked in ("auto", "srgb")] == ["pq", "srgb"]
     assert all(transfer_of(tag_of(curve), "auto") == curve for curve in ("bt709", "srgb", "gamma:2.2", "pq"))
-    assert transfer_of(tag_of("gamma:1.7"), "auto") == "bt709"
+    assert tag_of("gamma:1.7") == UNSPECIFIED and transfer_of(UNSPECIFIED, "auto") == "bt709"
     assert transfer_of(2, "auto") == transfer_of(2, "auto", "h264") == "bt709"
     assert [transfer_of(tag, "auto", "apng") for tag in (2, 16)] == ["srgb", "pq"]

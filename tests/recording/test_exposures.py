@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.tags import UNSPECIFIED
 from vid2ev.light.transfer import code_table
 from vid2ev.recording.exposures import KINDS, ExposureFiles, read_codes, read_spans, write_codes
 from vid2ev.sensors.cis import Cis
@@ -156,6 +157,16 @@ def test_the_film_plays_the_pictures_in_real_time(tmp_path: Path, kinds: list[st
         assert np.abs(seen.mean(axis=(0, 1)) - want.mean(axis=(0, 1))).max() < 6
         luma = [0.2126, 0.7152, 0.0722]
         assert np.corrcoef((seen @ luma).ravel(), (want @ luma).ravel())[0, 1] > 0.95
+
+
+@pytest.mark.parametrize(("gamma", "code"), [("srgb", 13), (1.0, 8), (2.2, 4), (1.7, UNSPECIFIED)])
+def test_a_film_names_the_curve_of_its_codes_and_no_other(tmp_path: Path, gamma: float | str, code: int) -> None:
+    spec = SPEC.model_copy(update={"gamma": gamma})
+    at_work = ExposureFiles(tmp_path / "work", ["mp4"], spec.picture_codes(), spec.curve, 30.0)
+    at_work.add(exposures(1)[0])
+    at_work.finish(tmp_path)
+    with av.open(str(tmp_path / "frames.mp4")) as container:
+        assert {picture.color_trc for picture in container.decode(video=0)} == {code}
 
 
 @pytest.mark.parametrize("known", [0, 1, 4, 7])

@@ -57,8 +57,8 @@ def transfer_of(tag: int, asked: str, codec: str = "") -> str:
 
 
 def tag_of(curve: str) -> int:
-    """The code of a transfer curve; that of BT.709 where it has none."""
-    return next((code for code, name in TRANSFERS.items() if name == curve), 1)
+    """The code of a transfer curve; that it is not specified where there is none."""
+    return next((code for code, name in TRANSFERS.items() if name == curve), UNSPECIFIED)
 
 
 def matrix_of(tag: int, width: int, height: int, path: object) -> tuple[float, float] | None:
