@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -190,6 +191,27 @@ def test_what_no_disk_takes_stops_one_video_only_and_is_a_sentence(jobs: list[st
         told = [line for line in result.stdout.splitlines() if line.startswith("failed ")]
         assert len(told) == 2 and all("File name too long; give" in line for line in told)
         assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize("jobs", [[], ["--jobs", "2"]])
+def test_a_folder_that_cannot_be_listed_does_not_stop_the_others(
+    jobs: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = Path.iterdir
+
+    def refused(folder: Path) -> Iterator[Path]:
+        if folder.name == "pictures":
+            raise PermissionError(13, "Permission denied", str(folder))
+        return listed(folder)
+
+    Path("list.txt").write_text("clips/pictures\nclips/a9.npy\n")
+    monkeypatch.setattr(Path, "iterdir", refused)
+    for k, videos in enumerate((["list.txt"], ["clips/pictures", "clips/a9.npy"])):
+        result = vid2ev(*videos, "-o", f"out{k}", "--dry-run", *jobs)
+        assert result.exit_code == 1 and "1 of 2 planned, 1 failed" in result.stdout
+        assert result.stderr == "error: clips/pictures: Permission denied; give the name of a file that can be opened\n"
+    alone = vid2ev("clips/pictures", "-o", "alone")
+    assert alone.exit_code == 1 and alone.stderr == result.stderr
 
 
 @pytest.mark.parametrize("error", [MemoryError(), PermissionError(13, "Permission denied", "clips/a10.npy")])

@@ -34,7 +34,10 @@ def sources_in(video: str) -> list[str]:
         return [source for line in _listed(folder) for source in sources_in(line)]
     if is_live(video) or not os.path.isdir(video) or is_recording(folder):  # (Path's raise OSError for long names)
         return [video]
-    held = [path for path in folder.iterdir() if not path.name.startswith(".")]
+    try:
+        held = [path for path in folder.iterdir() if not path.name.startswith(".")]
+    except OSError:
+        return [video]  # (who opens it says why it cannot be read; the others go on)
     clips = [path for path in held if _is_clip(path)]
     films = sum(path.suffix.lower() not in ARRAYS for path in clips)
     if len(pictures_in(folder)) > films:  # (if they are no more, they are covers and stills of these)
