@@ -95,5 +95,6 @@ def clause(message: str) -> str:
     message = re.sub(r", (unable|got) .*", "", message)
     message = re.sub(r"^Tuple should have at (least|most) (\d+) items?.*", r"it must have at \1 \2 entries", message)
     message = re.sub(r"^String should have at least 1 character$", "it must not be empty", message)
+    message = re.sub(r"^Unable to parse input .* integer.*", "it must be a whole number nearer to 0", message)
     message = re.sub(r"^Input should (be|have)", r"it must \1", message)
     return message.replace("a valid tuple", "a list").replace("valid dictionary", "table")

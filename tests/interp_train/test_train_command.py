@@ -157,6 +157,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--cpu", "--set", "batch=3"], "batches of 3 cannot be shared out evenly among 2 processes"),
         (["--dry-run", "--set", "network.size=small"], "setting network.size = 'small': it is none of a network's"),
         (["--dry-run", "--set", "network.name=x"], "rrin_events_guided has no option 'name'"),
+        (["--dry-run", "--set", "seed=1e20"], "setting seed = 1e+20 is impossible: it must be a whole number"),
         (["--dry-run", "--set", "betas=[2,3]"], "setting betas.0 = 2 is impossible: it must be less than 1"),
         (["--dry-run", "--set", "clips.size=[1,1]"], "setting clips.size.0 = 1 is impossible"),
         (["--dry-run", "--set", "clips.size=[100000,128]"], "setting clips.size.0 = 100000 is impossible"),

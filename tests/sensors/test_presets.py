@@ -139,6 +139,16 @@ def test_true_is_neither_a_number_nor_a_word(kind: Kind) -> None:
     assert len(fields) > 15
 
 
+@pytest.mark.parametrize("kind", [DVS, CIS])
+@pytest.mark.parametrize("text", ["1e20", "-1e20", "123456789012345678901234567890", "1.5", "inf", "some"])
+def test_of_whole_numbers_that_cannot_be_it_is_said_what_can(kind: Kind, text: str) -> None:
+    whole = [key for key, field in kind.spec.model_fields.items() if field.annotation is int]
+    assert whole
+    for key in whole:
+        with pytest.raises(UsageError, match=rf"^{key} = .* in sensor ideal is impossible: it must be [^,]*\.$"):
+            load(kind, "ideal", [f"{key}={text}"])
+
+
 @pytest.mark.parametrize(("value", "expected"), [("foo", "a valid number"), ("50", "less than or equal to 10")])
 def test_of_a_value_that_may_be_a_number_or_a_word_both_are_said(value: str, expected: str) -> None:
     with pytest.raises(UsageError, match=rf"gamma = .* is impossible: it must be {expected} or 'srgb' "):
