@@ -30,6 +30,7 @@ from vid2ev.sources.synthetic import MovingEdge
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=200,duration_s=0.2"
 OPTIONS: dict[str, Any] = {"upsample": "none", "seed": 3, "threads": 1}
+FRAMES = Rig(cameras=(Camera(name="aps", kind="cis"),))
 
 
 def rig(**camera: Any) -> Rig:
@@ -518,9 +519,8 @@ def test_another_seed_is_another_recording_of_a_rig(tmp_path: Path) -> None:
 
 
 def test_changes_to_sensors_that_are_not_there_are_refused(tmp_path: Path) -> None:
-    frames = Rig(cameras=(Camera(name="aps", kind="cis"),))
     with pytest.raises(UsageError, match="'exposure_us=5': expected an event camera to change; keys of frame sensors"):
-        convert(CLIP, tmp_path / "out", rig=frames, overrides=["exposure_us=5"], **OPTIONS)
+        convert(CLIP, tmp_path / "out", rig=FRAMES, overrides=["exposure_us=5"], **OPTIONS)
     with pytest.raises(UsageError, match="expected a list of texts"):
         convert(CLIP, tmp_path / "out", overrides="threshold_on=0.2", **OPTIONS)
 
@@ -528,14 +528,13 @@ def test_changes_to_sensors_that_are_not_there_are_refused(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("asked", "name"),
     [({"bayer": "RGGB"}, "bayer"), ({"labels": True}, "labels"), ({"frames": "npz"}, "frames of events"),
-     ({"probe": ["5,5"]}, "probe"), ({"noise_maps": True}, "noise_maps")],
+     ({"probe": ["5,5"]}, "probe"), ({"noise_maps": True}, "noise_maps"), ({"formats": "csv,dat"}, "format csv, dat")],
 )  # fmt: skip
 def test_what_is_of_events_alone_is_refused_where_no_camera_sends_any(
     tmp_path: Path, asked: dict[str, Any], name: str
 ) -> None:
-    frames = Rig(cameras=(Camera(name="aps", kind="cis"),))
     with pytest.raises(UsageError, match=f"^{name} without an event camera: .* leave {name} out"):
-        convert(CLIP, tmp_path / "out", rig=frames, **asked, **OPTIONS)
+        convert(CLIP, tmp_path / "out", rig=FRAMES, **asked, **OPTIONS)
     assert not (tmp_path / "out").exists()
 
 

@@ -187,6 +187,7 @@ def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
         raise UsageError(f"pictures as {', '.join(outputs.pictures)}: expected a frame camera; add --frames or --cis")
     of_events: dict[str, Any] = {"bayer": recipe.bayer, "labels": recipe.labels, "frames of events": outputs.frames}
     of_events |= {"probe": outputs.probe, "noise_maps": outputs.noise_maps}
+    of_events |= {f"format {', '.join(outputs.formats)}": outputs.formats != Outputs().formats}
     asked = next((name for name, value in of_events.items() if value), None)
     if asked and all(mount.kind == "cis" for mount in recipe.mounts):
         raise UsageError(f"{asked} without an event camera: expected one in the rig; add one, or leave {asked} out")
