@@ -14,9 +14,10 @@ from click.testing import CliRunner, Result
 
 from vid2ev import Events, read_events
 from vid2ev.cluster.workers import Workers
-from vid2ev.commands import batch, main
+from vid2ev.commands import INTERRUPTED, batch, main
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.frame_index import write_frame_index
+from vid2ev.making import conversion
 from vid2ev.sources import many
 
 QUICK = ["--upsample", "none", "--threads", "1", "--fps", "100", "--no-preview"]
@@ -168,8 +169,6 @@ def test_memory_of_a_process_is_limited_for_one_video_too(monkeypatch: pytest.Mo
 
 
 def test_a_mistake_of_the_program_stops_one_video_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    from vid2ev.making import conversion
-
     convert = conversion.convert
 
     def failing(video: str, *arguments: object, **options: object) -> object:
@@ -216,8 +215,6 @@ def test_a_folder_that_cannot_be_listed_does_not_stop_the_others(
 
 @pytest.mark.parametrize("error", [MemoryError(), PermissionError(13, "Permission denied", "clips/a10.npy")])
 def test_what_is_told_of_one_video_is_told_of_one_of_many(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    from vid2ev.making import conversion
-
     convert = conversion.convert
 
     def failing(video: str, *arguments: object, **options: object) -> object:
@@ -231,6 +228,30 @@ def test_what_is_told_of_one_video_is_told_of_one_of_many(error: Exception, monk
     result = vid2ev("clips/a10.npy", "clips/a9.npy", "-o", "out")
     assert result.exit_code == 1 and result.stderr == alone and "1 of 2 done" in result.stdout
     assert alone.removeprefix("error: ") in result.stdout
+
+
+@pytest.mark.parametrize("split", [[], ["--jobs", "2", "--split", "tiles"]])
+@pytest.mark.parametrize("place", [1, 2])
+def test_who_interrupts_one_of_many_is_told_that_those_before_are_kept(
+    place: int, split: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    videos = ["clips/broken.mp4", "clips/a9.npy", "clips/a10.npy"]
+    convert = conversion.convert
+
+    def interrupted(video: str, *arguments: object, **options: object) -> object:
+        if video == videos[place]:
+            raise KeyboardInterrupt
+        return convert(video, *arguments, **{"resume": False} | options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(conversion, "convert", interrupted)
+    monkeypatch.setattr(
+        "vid2ev.making.split.convert_split",
+        lambda video, directory, *_, look, **options: interrupted(video, directory, **options),
+    )
+    result = vid2ev(*videos, "-o", "out", "-q", *split)
+    made = Path("out/a9_events/manifest.json").exists()
+    assert result.exit_code == INTERRUPTED and made == (place > 1)
+    assert ("--resume" in result.stderr, "nothing is left" in result.stderr) == (made, not made)
 
 
 def test_several_outputs_of_one_conversion_agree() -> None:

@@ -121,7 +121,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
     found = [each for source in sources for each in sources_in(source, output or Path())]
     single = found == [*sources] and len(found) == 1
     if single and workers.scheduler is None:
-        made = _one(found[0], output or _default(found[0], options), quiet, taken, options)
+        made = _one(found[0], output or _default(found[0], options), quiet=quiet, taken=taken, options=options)
         if as_json:
             click.echo(json.dumps(made, indent=2))
         return
@@ -144,13 +144,15 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
     sys.exit(batch.exit_code(results))
 
 
-def _one(source: str, path: Path, quiet: bool, taken: Options, options: dict[str, Any]) -> dict[str, Any]:
-    """Interpolate a source; returns the manifest."""
+def _one(
+    source: str, path: Path, others: bool = False, *, quiet: bool, taken: Options, options: dict[str, Any]
+) -> dict[str, Any]:
+    """Interpolate a source, `others` perhaps being done already; returns the manifest."""
     from interp.interpolate.whole import interpolate as make
     from vid2ev.terminal import lines
 
     tell = None if quiet else lambda text: click.echo(f"by {text}")
-    with kept(path), bar(quiet, FRAMES, " frames") as report:
+    with kept(path, others), bar(quiet, FRAMES, " frames") as report:
         made = make(source, path, options=taken, report=report, told=tell, **options)
     if not quiet:
         click.echo(lines(_facts(path, made)))

@@ -87,8 +87,8 @@ def contrast_of(text: str | None) -> tuple[float, float] | None:
 
 
 @contextmanager
-def kept(path: Path) -> Iterator[None]:
-    """What goes wrong within, or asks to end, says so if it can be resumed."""
+def kept(path: Path, others: bool = False) -> Iterator[None]:
+    """What goes wrong within, or asks to end, says so if it can be resumed, as `others` that are done can."""
     from vid2ev.recording.destination import partial_of
 
     done = partial_of(path) / "done.jsonl"
@@ -98,7 +98,7 @@ def kept(path: Path) -> Iterator[None]:
     except DataError as error:
         raise DataError(f"{error}{f'; {KEPT}' * done.exists()}") from error
     except KeyboardInterrupt:
-        say_interrupted(KEPT if done.exists() else NOT_KEPT)
+        say_interrupted(KEPT if others or done.exists() else NOT_KEPT)
 
 
 @contextmanager

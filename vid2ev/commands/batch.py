@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from vid2ev.cluster.work import Outcome
     from vid2ev.cluster.workers import Workers
 
-Convert = Callable[[str, Path], dict[str, Any]]
+Convert = Callable[[str, Path, bool], dict[str, Any]]  # a video, its folder, and whether others are done
 
 
 def directories(videos: Iterable[str], within: Path) -> dict[str, Path]:
@@ -41,13 +41,13 @@ def directories(videos: Iterable[str], within: Path) -> dict[str, Path]:
 def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) -> list[dict[str, Any]]:
     """Convert all videos, whatever happens to some: for each video, directory, state ("done" or "failed"), and events
     or error with its exit code."""
-    results = []
+    results = list[dict[str, Any]]()
     for number, (video, directory) in enumerate(directories.items(), 1):
         if not quiet:
             click.echo(f"[{number}/{len(directories)}] {video} -> {directory}")
         result: dict[str, Any] = {"video": video, "directory": str(directory)}
         try:
-            made = convert(video, directory)
+            made = convert(video, directory, any(each["state"] == "done" for each in results))
         except Exception as error:  # (a mistake of ours in one video does not stop the others either)
             if isinstance(told := as_told(error), Vid2evError):
                 click.echo(f"error: {told}", err=True)

@@ -207,14 +207,14 @@ def convert(
     if not workers.alone:
         options["threads"] = options["threads"] or workers.threads
 
-    def each(video: str, directory: Path) -> dict[str, Any]:
+    def each(video: str, directory: Path, others: bool) -> dict[str, Any]:
         if dry_run or in_parts:
             checked_for(workers, video, directory, split if in_parts else None, options)
         if split and in_parts and not dry_run:
             # (Effects that are found while a clip passes are not to be found in parts of it.)
             chosen = chosen_for(video, directory, quiet, dict(options), given() | {"effects auto"})
-            return split_among(workers, video, directory, split, quiet, chosen)
-        return convert_one(video, directory, dry_run, verbose, quiet, dict(options))
+            return split_among(workers, video, directory, split, quiet, chosen, others)
+        return convert_one(video, directory, dry_run, verbose, quiet, dict(options), others)
 
     directories = {videos[0]: directory} if single else batch.directories(found, Path(output or ""))
     if workers.alone or in_parts or dry_run:

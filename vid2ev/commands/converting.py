@@ -16,9 +16,16 @@ if TYPE_CHECKING:
 
 
 def convert_one(
-    video: str, directory: Path, dry_run: bool, verbose: bool, quiet: bool, options: dict[str, Any]
+    video: str,
+    directory: Path,
+    dry_run: bool,
+    verbose: bool,
+    quiet: bool,
+    options: dict[str, Any],
+    others: bool = False,
 ) -> dict[str, Any]:
-    """Convert a video; returns the manifest, of a dry run what it would begin with."""
+    """Convert a video, `others` perhaps being done already; returns the manifest, of a dry run what it would begin
+    with."""
     from vid2ev.commands import summary
     from vid2ev.commands.dry_run import planned
     from vid2ev.commands.progress import bar, given, kept
@@ -42,7 +49,7 @@ def convert_one(
         if dry_run:
             return recipe
     live = is_live(video)
-    with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
+    with kept(directory, not live, others), heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]

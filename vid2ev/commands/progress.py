@@ -31,9 +31,9 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {
 
 
 @contextmanager
-def kept(directory: Path, again: bool = True) -> Iterator[None]:
+def kept(directory: Path, again: bool, others: bool) -> Iterator[None]:
     """What goes wrong within says so if it can be resumed; `again`: the source can be read again.  What was kept and is
-    damaged cannot."""
+    damaged cannot.  `others` that are done are kept, whatever becomes of this."""
     from vid2ev.recording.destination import partial_of
 
     try:
@@ -43,7 +43,7 @@ def kept(directory: Path, again: bool = True) -> Iterator[None]:
         kept = resumable and (partial_of(directory) / "checkpoint.npz").exists()
         if isinstance(error, DataError):
             raise DataError(f"{error}{f'; {KEPT}' * kept}") from error
-        say_interrupted(KEPT if kept else NOT_KEPT)
+        say_interrupted(KEPT if kept or others else NOT_KEPT)
 
 
 @contextmanager

@@ -46,9 +46,15 @@ def split_of(text: str | None, workers: Workers) -> Split | None:
 
 
 def split_among(
-    workers: Workers, video: str, directory: Path, split: Split, quiet: bool, options: dict[str, Any]
+    workers: Workers,
+    video: str,
+    directory: Path,
+    split: Split,
+    quiet: bool,
+    options: dict[str, Any],
+    others: bool,
 ) -> dict[str, Any]:
-    """Convert a video in parts; returns the manifest."""
+    """Convert a video in parts, `others` perhaps being done already; returns the manifest."""
     from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
     from vid2ev.commands.live import shared_out
     from vid2ev.commands.progress import bar
@@ -69,7 +75,7 @@ def split_among(
                 video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
             )
     except KeyboardInterrupt:
-        say_interrupted(KEPT if begun_parts(parts_of(directory)) else NOT_KEPT)
+        say_interrupted(KEPT if others or begun_parts(parts_of(directory)) else NOT_KEPT)
 
 
 def checked_for(workers: Workers, video: str, directory: Path, split: Split | None, options: dict[str, Any]) -> None:
