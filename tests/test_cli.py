@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from vid2ev.commands import main
 from vid2ev.commands.summary import file_facts, of_the_clip, result_facts, short
 from vid2ev.interrupts import heard, never_lost
 from vid2ev.making import conversion
+from vid2ev.recording.folder import Folder
 from vid2ev.recording.manifest import difference
 from vid2ev.seen import instants
 from vid2ev.seen.instants import Instant
@@ -485,6 +487,50 @@ def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyP
     result = vid2ev("convert", CLIP, "-o", "out", "--resume", *QUICK)
     assert result.exit_code == 0 and left() == {"whole", "out"}
     assert Path("out/events.h5").read_bytes() == Path("whole/events.h5").read_bytes()
+
+
+@pytest.mark.parametrize("again", [[], ["--overwrite"]])
+def test_of_a_recording_that_is_in_its_place_it_is_not_said_that_nothing_is_left(
+    again: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ["convert", CLIP, "-o", "out", *QUICK]
+    if again:
+        vid2ev(*arguments, "-q", "--seed", "1")
+    publish = Folder.publish
+
+    def interrupted(folder: Folder) -> None:
+        publish(folder)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Folder, "publish", interrupted)
+        result = vid2ev(*arguments, *again)
+    assert result.exit_code == 130 and "--resume goes on" in result.stderr and left() == {"out"}
+    made = Path("out/events.h5").stat()
+    assert vid2ev(*arguments, "--resume").exit_code == 0 and Path("out/events.h5").stat() == made
+
+
+@pytest.mark.parametrize("piece", [1, conversion.PIECE])
+def test_who_asks_twice_to_end_hears_what_is_left(piece: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second time while it is cleared up."""
+    remove, of_recipe = shutil.rmtree, instants._instants
+
+    def interrupted(*asked: Any) -> Iterator[Instant]:
+        yield from islice(of_recipe(*asked), 5)
+        raise KeyboardInterrupt
+
+    def asked_again(*arguments: Any, **options: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        remove(*arguments, **options)
+
+    monkeypatch.setitem(conversion.convert.__kwdefaults__, "piece", piece)
+    monkeypatch.setattr(instants, "_instants", interrupted)
+    monkeypatch.setattr(shutil, "rmtree", asked_again)
+    result = vid2ev("convert", CLIP, "-o", "out", *QUICK)
+    kept = piece == 1
+    assert (result.exit_code, result.stderr.count("\n")) == (130, 1)
+    assert ("--resume" in result.stderr, "nothing is left" in result.stderr) == (kept, not kept)
+    assert left() == ({"out.partial"} if kept else set())
 
 
 def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

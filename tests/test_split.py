@@ -463,6 +463,19 @@ def test_who_interrupts_the_command_is_told_what_is_kept(
     assert Path("made.parts").exists() == kept
 
 
+def test_who_interrupts_once_the_recording_is_there_is_told_that_it_is_kept(
+    clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(_: str, directory: Path, *__: Any, **___: Any) -> None:
+        directory.mkdir()
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("vid2ev.making.split.convert_split", interrupted)
+    result = CliRunner().invoke(main, ["convert", clip, "--fps", "50", "-o", "made", "--jobs", "2", "--split", "tiles"])
+    assert result.exit_code == 130 and "--resume goes on" in result.stderr
+
+
 @pytest.mark.slow
 def test_the_command_splits_among_its_workers(clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

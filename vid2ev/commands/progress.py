@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,7 @@ def kept(directory: Path, again: bool, others: bool) -> Iterator[None]:
     damaged cannot.  `others` that are done are kept, whatever becomes of this."""
     from vid2ev.recording.destination import partial_of
 
+    before = which(directory)
     try:
         yield
     except (DataError, KeyboardInterrupt) as error:
@@ -43,7 +44,15 @@ def kept(directory: Path, again: bool, others: bool) -> Iterator[None]:
         kept = resumable and (partial_of(directory) / "checkpoint.npz").exists()
         if isinstance(error, DataError):
             raise DataError(f"{error}{f'; {KEPT}' * kept}") from error
-        say_interrupted(KEPT if kept or others else NOT_KEPT)
+        made = which(directory) != before  # (it was put in its place before that was heard)
+        say_interrupted(KEPT if kept or others or (made and again) else NOT_KEPT * (not made))
+
+
+def which(path: Path) -> int | None:
+    """What tells a file or a folder from another of its name; None if there is none."""
+    with suppress(OSError):
+        return path.stat().st_ino
+    return None
 
 
 @contextmanager

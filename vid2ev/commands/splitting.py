@@ -57,7 +57,7 @@ def split_among(
     """Convert a video in parts, `others` perhaps being done already; returns the manifest."""
     from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import bar
+    from vid2ev.commands.progress import bar, which
     from vid2ev.interrupts import heard
     from vid2ev.making.split import begun_parts, convert_split, parts_of
     from vid2ev.terminal import counting
@@ -68,6 +68,7 @@ def split_among(
         if errors:
             raise errors[0]
 
+    before = which(directory)
     try:
         with heard() as check, ExitStack() as looking, bar(quiet, check) as report:
             look = looking.enter_context(counting(quiet, LOOKS))
@@ -75,7 +76,8 @@ def split_among(
                 video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
             )
     except KeyboardInterrupt:
-        say_interrupted(KEPT if others or begun_parts(parts_of(directory)) else NOT_KEPT)
+        kept = others or which(directory) != before or begun_parts(parts_of(directory))
+        say_interrupted(KEPT if kept else NOT_KEPT)
 
 
 def checked_for(workers: Workers, video: str, directory: Path, split: Split | None, options: dict[str, Any]) -> None:

@@ -32,7 +32,7 @@ from vid2ev.errors import DataError, SavedError, UsageError, Vid2evError
 from vid2ev.formats.eager import EagerFile
 from vid2ev.recording.destination import begun_at, check_apart, check_folder, partial_of
 from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
-from vid2ev.recording.held import LOCK, Held
+from vid2ev.recording.held import LOCK, Held, undisturbed
 from vid2ev.recording.manifest import is_of_job, read_manifest
 from vid2ev.untrusted import read_arrays
 
@@ -88,15 +88,16 @@ class Folder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for file in self._files.values():
-            with suppress(OSError):
-                file.close()
-        if self._held:
-            if self.finished or not self.resumable:
+        with undisturbed():  # (Ctrl-C twice leaves nothing, either)
+            for file in self._files.values():
                 with suppress(OSError):
-                    self._clear()
-                shutil.rmtree(self.partial, ignore_errors=True)
-            self._held.close()
+                    file.close()
+            if self._held:
+                if self.finished or not self.resumable:
+                    with suppress(OSError):
+                        self._clear()
+                    shutil.rmtree(self.partial, ignore_errors=True)
+                self._held.close()
 
     @property
     def resumable(self) -> bool:
