@@ -67,7 +67,7 @@ def pyramid() -> Mesh:
 
 
 @pytest.mark.parametrize("kind", ["plane", "box", "mesh"])
-@pytest.mark.parametrize("repeat", [(1.0, 1.0), (3.0, 1.0), (0.5, 2.5)])
+@pytest.mark.parametrize("repeat", [(1.0, 1.0), (3.0, 1.0), (0.5, 2.5), (-1.0, -2.5), (-3.0, -0.5)])
 def test_what_is_written_is_the_scene(stand: Stand, kind: Kind, repeat: tuple[float, float]) -> None:
     stand()
     surface = Surface(clouds(3, 2), (0.5, 1.0, 2.0), repeat, emission=0.25)

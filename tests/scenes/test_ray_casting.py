@@ -110,7 +110,7 @@ def test_faces_show_their_picture_upright_and_unmirrored():
             assert light[14, 22].argmax() == 0 and light[14, 42].argmax() == 1 and light[34, 22].argmax() == 2
 
 
-@pytest.mark.parametrize("kind", ["plane", "box"])
+@pytest.mark.parametrize("kind", ["plane", "box", "sphere"])
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_picture_that_is_repeated_less_than_no_time_is_mirrored(kind, times):
     picture = Texture(np.random.default_rng(0).random((8, 8, 3)))
@@ -119,9 +119,8 @@ def test_a_picture_that_is_repeated_less_than_no_time_is_mirrored(kind, times):
         for repeat in ((times, times), (-times, times), (times, -times))
     )
     assert one.std() > 0.1
-    inner = np.s_[10:-10, 18:-18]  # (its border's colour is held by pictures that are there once)
-    np.testing.assert_allclose(across[inner], one[inner][:, ::-1], atol=2e-5)
-    np.testing.assert_allclose(down[inner], one[inner][::-1], atol=2e-5)
+    np.testing.assert_allclose(across, one[:, ::-1], atol=2e-5)
+    np.testing.assert_allclose(down, one[::-1], atol=2e-5)
 
 
 def test_a_pixel_does_not_depend_on_threads_or_on_other_frames():

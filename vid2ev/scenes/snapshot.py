@@ -2,7 +2,7 @@
 
     X_world = thing.pose.apply(X_thing)           all lengths in metres
     light   = albedo (sum of E cos(turn) + emission) + specular (sum of E cos(turn) cos(half)^shininess)
-    albedo  = colour * texture(repeat * (u, v))
+    albedo  = colour * texture(repeat * (u, v))          with 1 more of u or v where its repeat is negative
 
 E is the light that a lamp sends to the point, relative: a white diffuse surface under ambient light of 1.0 has light
 1.0, and so has one that faces a sun of 1.0, or a point lamp of 1.0 from a distance of `reach_m`.
@@ -18,7 +18,7 @@ of a world may be those of a camera (x right, y down, z forwards): then what fac
     environment  u = 1/2 + atan2(x, z) / 2 pi,  v = acos(-y) / pi, of the direction in which one looks
 
 A picture is repeated where (u, v) leaves 0 ... 1; on planes, boxes and along v of spheres and cylinders, a `repeat` of
-0 to 1 holds its border's colour instead.  A negative `repeat` shows the picture mirrored.
+-1 to 1 holds its border's colour instead.  A negative `repeat` shows the picture mirrored.
 
 Source of the law of light: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH 1977,
 with the highlight weighted by cos(turn), so that it fades where the lamp sets.

@@ -92,7 +92,7 @@ def wraps_on(thing: Thing) -> tuple[bool, bool]:
     """Whether its picture begins anew where (u, v) leave 0 ... 1, across and down."""
     kind, (across, down) = thing.shape.kind, thing.surface.repeat
     around = kind in ("sphere", "cylinder", "mesh")
-    return around or not 0 <= across <= 1, kind == "mesh" or not 0 <= down <= 1
+    return around or abs(across) > 1, kind == "mesh" or abs(down) > 1
 
 
 def _ball(thing: Thing, camera: Pose) -> tuple[float, ...]:

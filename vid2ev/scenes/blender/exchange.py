@@ -182,7 +182,7 @@ def _placed(
     for length, times, around in zip((width, height), repeat, wraps, strict=True):
         inside = 1.0 if around else length / (length + 2)
         scale.append(inside * times)
-        offset.append((1 - inside) / 2)
+        offset.append((1 - inside) / 2 + inside * (times < 0))
     return [scale[0], -scale[1]], [offset[0], 1 - offset[1]]
 
 

@@ -71,11 +71,17 @@ def colour_on(world, thing, uv, du, dv, normal, d, t, across, down):
     lowered = footprint(normal, d, turned(world.turn, thing, down[0], down[1], 0.0), t)
     repeat_u, repeat_v = world.repeat[thing, 0], world.repeat[thing, 1]
     return colour_of(
-        world, world.texture[thing], uv[0] * repeat_u, uv[1] * repeat_v,
+        world, world.texture[thing], repeated(uv[0], repeat_u), repeated(uv[1], repeat_v),
         dot(du, moved) * repeat_u, dot(dv, moved) * repeat_v,
         dot(du, lowered) * repeat_u, dot(dv, lowered) * repeat_v,
         world.wraps[thing, 0], world.wraps[thing, 1],
     )  # fmt: skip
+
+
+@law
+def repeated(u, times):
+    """The place in a picture that is there so many times; of a mirrored one (times < 0), from its far end."""
+    return u * times + 1.0 if times < 0.0 else u * times
 
 
 @law
