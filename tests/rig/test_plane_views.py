@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from typing import Any
 
 import cv2
@@ -13,6 +14,8 @@ from kornia.geometry.transform import warp_perspective
 from view_rigs import Texture, homography, pinhole, psnr
 
 from vid2ev.errors import UsageError
+from vid2ev.rig import homography as homography_module
+from vid2ev.rig import views as views_module
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.rig.homography import places_on_plane
 from vid2ev.rig.intrinsics import SHORTEST_PX, Intrinsics
@@ -128,6 +131,27 @@ def test_fine_stripes_do_not_alias_into_coarse_ones(factor: float) -> None:
     small = pinhole((int(240 / factor) - 2, int(160 / factor) - 2), 200 / factor)
     seen = Views(source, [(small, IDENTITY)]).see(stripes)[0].light
     assert np.abs(seen - 0.5).max() < 0.13, np.abs(seen - 0.5).max()
+
+
+@pytest.mark.parametrize("lens", BENT)
+def test_a_wide_view_of_a_tele_video_is_made_a_part_at_a_time(lens: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    source, wide = Intrinsics.of_field((320, 240), 5), Intrinsics.of_field((64, 48), 40, **BENT[lens])
+    light, places = noise((320, 240)), 16 * 64 * 16 * 48
+    made, most = [], []
+    for at_once in (places, 5000, 1):
+        for module in (homography_module, views_module):
+            monkeypatch.setattr(module, "AT_ONCE", at_once)
+        tracemalloc.start()
+        views = Views(source, [(wide, Pose.of((1, 2, 3)))])
+        made.append((views.see(light)[0], views.looks()[0].places))
+        most.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    for view, there in made[1:]:
+        np.testing.assert_array_equal(view.light, made[0][0].light)
+        np.testing.assert_array_equal(view.valid, made[0][0].valid)
+        assert there.x.size == places and np.abs(there.x - made[0][1].x).max() < 1e-4
+    assert 0 < made[0][0].valid.mean() < 0.1
+    assert max(most[1:]) < 16 * places < most[0] / 4  # (of which 9 bytes a place are kept)
 
 
 def test_more_pixels_than_the_source_has() -> None:

@@ -26,6 +26,7 @@ from vid2ev.rig.pose import Pose
 BORDER_PX = 1e-3  # beyond the outermost pixels' borders: rounding, not a place outside
 SKIPPED = 0.25  # px of the source, between two places: so little is not worth more of them
 FINEST = 16  # places across a pixel, at most
+AT_ONCE = 1 << 18  # places: some 30 MB of float64
 
 
 class Places(NamedTuple):
@@ -40,17 +41,20 @@ def places_on_plane(
     source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float = math.inf, samples: int = 1
 ) -> Places:
     """Where in the source the pixels of a camera look, the scene being a plane at plane_m, infinity allowed."""
-    width, height = camera.size
-    fine = camera.scaled_to((width * samples, height * samples)) if samples > 1 else camera
-    rays = rays_of(pixel_grid(fine.size), fine)
+    width, height = camera.size[0] * samples, camera.size[1] * samples
+    fine = camera.scaled_to((width, height)) if samples > 1 else camera
     before = _before_plane(pose, plane_m)
-    directions = rays @ (_onto_plane(pose, plane_m) if before else pose.rotation).T
-    px = pixels_of(directions, source)
-    with np.errstate(invalid="ignore"):
-        inside = (px >= -0.5 - BORDER_PX).all(-1) & (px <= np.array(source.size) - 0.5 + BORDER_PX).all(-1)
-    lost = np.isnan(px).any(-1)
-    px[lost] = _towards(directions[lost], source)
-    return Places(px[..., 0].astype(np.float32), px[..., 1].astype(np.float32), np.asarray(inside & before))
+    onto = _onto_plane(pose, plane_m) if before else pose.rotation
+    x, y = (np.empty((height, width), np.float32) for _ in range(2))
+    seen = np.empty((height, width), np.bool_)
+    rows = max(AT_ONCE // width, 1)
+    for first in range(0, height, rows):  # (wide cameras around tele videos have 256 places in each pixel)
+        band = np.s_[first : first + rows]
+        grid = pixel_grid((width, len(x[band])))
+        grid[..., 1] += first
+        px, inside = _met(rays_of(grid, fine) @ onto.T, source)
+        x[band], y[band], seen[band] = px[..., 0], px[..., 1], inside & before
+    return Places(x, y, seen)
 
 
 def samples_for(places: Places, samples: int = 1, every: int = 1) -> int:
@@ -66,6 +70,17 @@ def samples_for(places: Places, samples: int = 1, every: int = 1) -> int:
         step = np.hypot(np.diff(x, axis=0), np.diff(y, axis=0))[seen[1:] & seen[:-1]]
         spacings.append(samples * float(np.median(step)) if step.size else 1.0)
     return min(max(math.ceil(max(spacings) - SKIPPED), 1), FINEST)
+
+
+def _met(directions: np.ndarray, source: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
+    """The places of the source [..., 2 px] in directions [..., 3], those on its border where it has none, and which
+    are in its picture."""
+    px = pixels_of(directions, source)
+    with np.errstate(invalid="ignore"):
+        inside = (px >= -0.5 - BORDER_PX).all(-1) & (px <= np.array(source.size) - 0.5 + BORDER_PX).all(-1)
+    lost = np.isnan(px).any(-1)
+    px[lost] = _towards(directions[lost], source)
+    return px, np.asarray(inside)
 
 
 def _before_plane(pose: Pose, plane_m: float) -> bool:

@@ -28,7 +28,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.rig.bands import Bands
 from vid2ev.rig.holes import Fill, apply_fill, fill_of
-from vid2ev.rig.homography import Places, places_on_plane, samples_for
+from vid2ev.rig.homography import AT_ONCE, Places, places_on_plane, samples_for
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.rig.sampling import pixel_means, sampled
@@ -117,14 +117,25 @@ class Views:
     def _sampled(self, light: np.ndarray, looks: dict[int, Look]) -> dict[int, np.ndarray]:
         """Light of an array, as cameras see it."""
         self._fit(light)
+        return {
+            k: self._light_of(look, self._samples(k, look)).reshape(*look.valid.shape, *light.shape[2:])
+            for k, look in looks.items()
+        }
+
+    def _light_of(self, look: Look, samples: int) -> np.ndarray:
+        """Light [h, w, C] of a view; that of finer places some rows at a time, but for holes, which are filled from
+        anywhere."""
         assert self._spline
-        seen = {}
-        for k, look in looks.items():
-            fine = sampled(self._spline, look.places.x, look.places.y, self._bands, *look.cuts)
+        (x, y, _), rows = look.places, len(look.places.x)
+        if samples > 1 and look.fill is None:
+            rows = samples * max(AT_ONCE // (samples * x.shape[1]), 1)
+        made = []
+        for first in range(0, len(x), rows):
+            fine = sampled(self._spline, x[first : first + rows], y[first : first + rows], self._bands, *look.cuts)
             if look.fill is not None:
                 apply_fill(look.fill, fine, SMOOTHINGS)
-            seen[k] = pixel_means(fine, self._samples(k, look)).reshape(*look.valid.shape, *light.shape[2:])
-        return seen
+            made.append(pixel_means(fine, samples))
+        return made[0] if len(made) == 1 else np.concatenate(made)
 
     def _sampled_on_device(self, light: Any, looks: dict[int, Look]) -> dict[int, Any]:
         """Light of a tensor, as cameras see it."""
