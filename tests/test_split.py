@@ -29,6 +29,7 @@ from vid2ev.making.conversion import Paused
 from vid2ev.making.split import check_split, convert_split
 from vid2ev.making.stretches import at_cuts, warm_up_us, with_warm_up
 from vid2ev.recording.held import Held
+from vid2ev.rig.camera import Camera, Rig
 from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
@@ -291,11 +292,38 @@ def test_the_cameras_of_a_rig_are_split_alike(clip: str, tmp_path: Path, kind: s
         "threads": 1,
         "rig": rig,
         "preview": False,
+        "truth": "mask,poses",
     }
     convert(clip, tmp_path / "whole", **options)
     convert_split(clip, tmp_path / "made", kind, 2, here, **options)
-    for name in ("left/events.h5", "right/events.h5", "still/raw/000000.png"):
+    for name in ("left/events.h5", "right/events.h5", "still/raw/000000.png", "left/truth/poses.txt"):
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("kind", ["tiles", "approximate"])
+def test_parts_hold_the_events_alone_which_may_be_seen_at_the_instants_of_frame_cameras(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stretches, "WARM_US", 10_000)
+    scene = "scene:spinning-shapes,duration_s=0.06,size=64x48,max_shift_px=2"
+    still = Camera(name="still", kind="cis", size=(96, 72), translation_mm=(30, 0, 0), set={"frame_rate_hz": 100})
+    rig = Rig(cameras=(still, Camera(name="left", kind="dvs"), Camera(name="right", kind="dvs", clock_offset_us=7)))
+    options: dict[str, Any] = {"threads": 1, "rig": rig, "preview": False, "truth": "depth,map", "sensor": "ideal"}
+    held = set()
+
+    def looked_at(tasks: Sequence[Task]) -> None:
+        here(tasks)
+        held.update(path.relative_to(tmp_path / "made.parts").parts[1:2] for path in tmp_path.glob("made.parts/*/*"))
+
+    whole = convert(scene, tmp_path / "whole", **options)
+    convert_split(scene, tmp_path / "made", kind, 2, looked_at, **options)
+    assert held == {("left",), ("right",), ("manifest.json",), ("rig.toml",)}
+    for name in ("left/events.h5", "right/events.h5") * (kind == "tiles") + ("still/raw/000003.png",):
+        assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+    made = json.loads((tmp_path / "made/manifest.json").read_text())
+    assert [each["counts"]["frames"] for each in made["results"].values()] == [
+        each["counts"]["frames"] for each in whole["results"].values()
+    ]
 
 
 @pytest.mark.parametrize(

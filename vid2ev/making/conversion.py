@@ -73,6 +73,7 @@ def convert(
     notes: Mapping[str, Any] | None = None,
     device: str = "cpu",
     part: Part = WHOLE,
+    events_only: bool = False,
     since_ns: int | None = None,
     made: Made | None = None,
     pause: Callable[[], bool] | None = None,
@@ -95,6 +96,7 @@ def convert(
     device     where light and events are made: cpu, cuda (a GPU; the CPU where there is none), or auto, by how much
                there is to do (`sensors.devices`); "simulated" is for tests.  Light differs by what float32 rounds
     part       pixels of the event cameras that are simulated; `split` puts the recordings of all parts together
+    events_only  leave out frame cameras and truth: of a part only the events are used
     since_ns   the instant that the recording begins with; what is seen before it only warms event cameras (not with
                effects "auto", which would have to look at it)
     made       the events of all parts, which are then not simulated
@@ -127,7 +129,9 @@ def convert(
     recipe, plans = (recipe, {}) if planner else planned(recipe, effects, tolerance)
     if resume:
         check_twice(recipe)
-    job = job_of(recipe, outputs, tolerance if planner else None, plans, notes)
+    whole = {"part_of": recipe.describe()} if events_only else {}  # (whose instants may suit frame cameras)
+    recipe = recipe.of_events() if events_only else recipe
+    job = whole | job_of(recipe, outputs, tolerance if planner else None, plans, notes)
     job |= {} if part == WHOLE else {"part": list(part)}
     job |= {} if since_ns is None else {"since_ns": since_ns}
     beside = growing(recipe, outputs)
@@ -211,7 +215,7 @@ def _manifests(job: dict[str, Any], recorder: Recorder, run: dict[str, Any]) -> 
     recipe = recorder.recipe
     if recipe.alone:
         return {"": job | recorder.outcome(0) | {"run": run}}
-    outcomes = {mount: recorder.outcome(mount.number) for mount in recipe.mounts}
+    outcomes = {mount: recorder.outcome(place) for place, mount in enumerate(recipe.mounts)}
     common, plans = {"outputs": job["outputs"]}, job.get("plan", {})
     own = {mount.name: {"plan": {mount.name: plans[mount.name]}} if plans else {} for mount in recipe.mounts}
     manifests = {

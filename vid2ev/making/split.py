@@ -162,7 +162,7 @@ def _part(tell: Tell, video: str, folder: Path, options: dict[str, Any]) -> None
     if folder.exists():
         with reading(folder):
             read_manifest(folder)
-    convert(video, folder, resume=True, report=telling(tell), preview=False, **options)
+    convert(video, folder, resume=True, report=telling(tell), preview=False, events_only=True, **options)
 
 
 def _parts(

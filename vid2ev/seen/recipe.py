@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from functools import partial
 from inspect import signature
 from pathlib import Path
@@ -181,6 +181,12 @@ class Recipe:
                 f"camera {away.name} stands beside the video's, and how far the scene is was not said; add --depth"
                 " plane:METRES, a depth map or a folder of them"
             )
+
+    def of_events(self) -> Recipe:
+        """The recipe without frame cameras and truth: of the event cameras, which send the same."""
+        both = zip(self.rig.viewpoints, self.mounts, strict=True)
+        views, mounts = zip(*((view, mount) for view, mount in both if mount.kind == "dvs"), strict=True)
+        return replace(self, rig=replace(self.rig, viewpoints=views), mounts=mounts, truth=None)
 
     def upsampler(self, upload: Upload | None = None) -> Upsampler:
         """A new upsampler, which makes light on a device if there is an `upload` to it."""

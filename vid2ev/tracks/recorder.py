@@ -203,9 +203,9 @@ class Recorder:
 
     def write(self, whole: Path) -> None:
         """The files of all cameras, but for the manifests."""
-        for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
+        for place, (mount, track) in enumerate(zip(self.recipe.mounts, self.tracks, strict=True)):
             (whole / mount.within).mkdir(exist_ok=True)
-            track.write(whole / mount.within, *self.span_us(mount.number))
+            track.write(whole / mount.within, *self.span_us(place))
         for mount, truth in zip(self.recipe.mounts, self._truths, strict=False):
             truth.write(whole / mount.within)
         if not self.recipe.alone:
@@ -224,12 +224,12 @@ class Recorder:
         rig = rig.model_copy(update={"cameras": tuple(cameras)})
         write_text(whole / RIG, rig_text(rig), overwrite=True)
 
-    def span_us(self, number: int) -> tuple[int, int]:
-        """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last
-        thing that it sent where its readout makes it later."""
-        offset_us = self.recipe.mounts[number].clock_offset_us
+    def span_us(self, place: int) -> tuple[int, int]:
+        """Start and length of the recording of the camera at a place in the recipe, on its own clock: from the first
+        frame to the last, or to the last thing that it sent where its readout makes it later."""
+        offset_us = self.recipe.mounts[place].clock_offset_us
         start_us = self.done.start_ns // 1000 + offset_us
-        return start_us, max(self.done.end_ns // 1000 + offset_us, self.tracks[number].last_us) - start_us
+        return start_us, max(self.done.end_ns // 1000 + offset_us, self.tracks[place].last_us) - start_us
 
     def _add_truth(self, instant: Instant) -> None:
         for track, truth in zip(self._truths, instant.truth, strict=False):
@@ -255,22 +255,22 @@ class Recorder:
             probed=partial(made.probed, mount, self.outputs.probe) if made else None,
         )
 
-    def outcome(self, number: int) -> dict[str, Any]:
-        """What came out of a camera, for its manifest."""
-        done, track, kind = self.done, self.tracks[number], self.recipe.mounts[number].kind
-        start_us, duration_us = self.span_us(number)
+    def outcome(self, place: int) -> dict[str, Any]:
+        """What came out of the camera at a place in the recipe, for its manifest."""
+        done, track, mount = self.done, self.tracks[place], self.recipe.mounts[place]
+        start_us, duration_us = self.span_us(place)
         counts = {"frames": done.frames, "subframes": done.subframes, "limited_intervals": done.limited}
         return {
             "start_us": start_us,
             "duration_us": duration_us,
             "counts": counts | track.counts(),
-            "cuts_us": [cut_us + self.recipe.mounts[number].clock_offset_us for cut_us in done.cuts_us],
-            "warnings": done.warnings + _remarks(done, kind) + self._unseen(number) + track.remarks(),
+            "cuts_us": [cut_us + mount.clock_offset_us for cut_us in done.cuts_us],
+            "warnings": done.warnings + _remarks(done, mount.kind) + self._unseen(mount) + track.remarks(),
         }
 
-    def _unseen(self, number: int) -> list[str]:
+    def _unseen(self, mount: Mount) -> list[str]:
         """A remark on a camera that sees nothing of the video: its light is made up."""
-        recipe, mount = self.recipe, self.recipe.mounts[number]
+        recipe = self.recipe
         if recipe.source.dense or not sees_nothing(recipe.rig.source, mount, recipe.plane_m):
             return []
         return [
