@@ -7,6 +7,7 @@ from fractions import Fraction
 from itertools import islice
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -366,6 +367,31 @@ def test_maps_of_depth_that_no_frame_had_are_told(tmp_path: Path, maps: int) -> 
     assert len(list(source.frames(1))) == 3
     assert source.warnings == [f"{name}: 6 depth maps, of which only the first 4 had a frame; are they of other times"
                                " than the frames?"] * (maps == 6)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["images", "array", "video"])
+@pytest.mark.parametrize("options", [{}, {"start": 1.0}, {"start": 1.0, "stop": 2.5}], ids=str)
+def test_a_picture_that_is_dropped_for_its_time_takes_its_depth_with_it(
+    tmp_path: Path, encode, kind: str, options: dict[str, float]
+) -> None:
+    pictures = [np.full((16, 16), 40 * k + 20, np.uint8) for k in range(5)]
+    times = [0, 1, 1, 2, 3]
+    if kind == "video":
+        path = encode("a.mkv", pictures, stamps=times, time_base=Fraction(1))
+    elif kind == "array":
+        path = tmp_path / "a.npy"
+        np.save(path, np.stack(pictures) / np.float32(255))
+        np.save(tmp_path / "a_timestamps.npy", np.array(times, float))
+    else:
+        path = tmp_path / "a"
+        path.mkdir()
+        for k, picture in enumerate(pictures):
+            cv2.imwrite(str(path / f"{k}.png"), picture)
+        (path / "timestamps.txt").write_text("# s\n" + "".join(f"{t}\n" for t in times))
+    source = open_source(path, seen_through=lambda whole, _: WithDepth(whole, AskedDepth(), "a"), **options)
+    kept = [k for k in (0, 1, 3, 4) if options.get("start", 0) <= times[k] <= options.get("stop", 9)]
+    for first in range(len(kept)):
+        assert [float(frame.depth[0, 0]) - 1 for frame in source.frames(first)] == kept[first:]
 
 
 class AskedDepth:

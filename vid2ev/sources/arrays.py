@@ -98,7 +98,7 @@ class ArrayStack:
         stamps: Sequence[Fraction | None] = self._stamps or [None] * self._stack.shape[0]
         with self._stack.opened() as read:
             for k, t_ns in clock.within(enumerate(stamps), since_ns, until_ns, start):
-                yield Frame(self._reader.light(read(k)), t_ns)
+                yield Frame(self._reader.light(read(k)), t_ns, number=k)
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
     def _find_times(self) -> None:

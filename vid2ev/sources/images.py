@@ -122,7 +122,8 @@ class Images:
         clock, pages = Clock(self._fps), None if self.path.is_dir() else PageReader(self.path)
         stamps: Sequence[Fraction | None] = self._stamps or [None] * len(self._places)
         for (file, page), t_ns in clock.within(zip(self._places, stamps, strict=True), since_ns, until_ns, start):
-            yield Frame(self._light(file, pages.read(page) if pages else read_picture(file)), t_ns)
+            light = self._light(file, pages.read(page) if pages else read_picture(file))
+            yield Frame(light, t_ns, number=clock.frames - 1)
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
     def _light(self, file: Path, picture: Picture) -> np.ndarray:

@@ -113,7 +113,7 @@ class Video:
             if until_ns is not None and t_ns > until_ns:
                 return
             if index >= start:
-                yield Frame(self._light(picture), t_ns)
+                yield Frame(self._light(picture), t_ns, number=clock.frames - 1 if since_s is None else None)
             index += 1
         remarks += [*clock.remarks(), *self._cut_short(picture)]
         self.warnings.extend(remark for remark in remarks if remark not in self.warnings)

@@ -65,8 +65,9 @@ class WithDepth(Edit):
         for index, frame in islice(part, start - skipped, None):
             if until_ns is not None and frame.t_ns > until_ns:
                 return
-            yield replace(frame, depth=self._depth.at(index, frame.light))
-            seen = index + 1
+            number = index if frame.number is None else frame.number  # (pictures that are dropped have maps, too)
+            yield replace(frame, depth=self._depth.at(number, frame.light))
+            seen = number + 1
         self._frames = seen
 
 

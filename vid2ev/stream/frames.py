@@ -26,7 +26,8 @@ class Frame:
     False for one made between two of them.  `cut` is True where a new shot begins: what was seen before has nothing to
     do with it.  `depth`, where it is known, is float32 [H, W]: how far the scene is along the axis of the camera that
     sees it [m]; what is not finite and positive is unknown.  `still` says what has not changed since the frame before,
-    where whoever made both knows.
+    where whoever made both knows.  `number` is that of its picture in the source, of which some may be dropped, counted
+    from the first one, where that is known and the frame is one of the source.
     """
 
     light: np.ndarray
@@ -35,6 +36,7 @@ class Frame:
     cut: bool = False
     depth: np.ndarray | None = None
     still: Still | None = None
+    number: int | None = None
 
     @property
     def luminance(self) -> np.ndarray:
