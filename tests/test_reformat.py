@@ -67,6 +67,21 @@ def test_there_and_back(recording: Path, name: str) -> None:
     ]
 
 
+@pytest.mark.parametrize("name", [name for name in writable() if format_named(name).open])
+def test_what_a_format_does_not_hold_is_said(recording: Path, name: str) -> None:
+    """Whatever is lost of size, labels and the times of frames, and nothing else."""
+    frame_us = START_US + np.arange(0, 2_000_001, 500_000)
+    write = format_named("hdf5").write
+    assert write is not None
+    write(Path("timed.h5"), replace(survey(open_events(recording)), frame_us=frame_us))
+    there = Path(f"there{format_named(name).suffix}")
+    warnings = " ".join(reformat("timed.h5", there, name)["warnings"])
+    file = open_events(there)
+    assert ("labels" in warnings) == (not file.labelled)
+    assert ("frame times" in warnings) == (getattr(file, "frame_us", None) is None)
+    assert ("hold the size, 320x240" in warnings) == (file.size is None)
+
+
 def test_the_suffix_says_the_format() -> None:
     for name in writable():
         kind = format_of_suffix(Path(f"any{format_named(name).suffix.upper()}"))

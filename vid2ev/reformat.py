@@ -26,7 +26,7 @@ from vid2ev.recording.held import Held
 from vid2ev.stream.events import Events
 from vid2ev.views.window import beginning_us, window
 
-KEPT = ("labels", "frames")  # what events may have beside t, x, y, p
+KEPT = ("labels", "frames", "frame times")  # what events may have beside t, x, y, p
 
 Report = Callable[[Recording, int], object]
 
@@ -66,9 +66,8 @@ def reformat(
     check_holds(kind, recording.size, recording.duration_us, recording.start_us)
     seen_us: list[int] = []
     made = _write(target, kind, _reported(recording, report, seen_us), overwrite)
-    had = {"labels": recording.labelled, "frames": recording.frames is not None}
-    unsaid = [f"the size is not stated; {recording.size[0]}x{recording.size[1]} holds all events"] * (file.size is None)
-    lost = [what for what in KEPT if had[what] and what not in kind.keeps]
+    had = (recording.labelled, recording.frames is not None, recording.frame_us is not None)
+    lost = [what for what, there in zip(KEPT, had, strict=True) if there and what not in kind.keeps]
     return {
         "source": str(source),
         "path": str(target),
@@ -81,8 +80,21 @@ def reformat(
         "duration_us": recording.duration_us,
         "span_us": seen_us[-1] - seen_us[0] if seen_us else 0,  # from the first event to the last
         "bytes": sum(path.stat().st_size for path in made),
-        "warnings": file.warnings + unsaid + [f"{kind.name} does not hold {what}; they are left out" for what in lost],
+        "warnings": [
+            *file.warnings,
+            *_of_size(recording.size, file.size is not None, kind),
+            *(f"{kind.name} does not hold {what}; they are left out" for what in lost),
+        ],
     }
+
+
+def _of_size(size: tuple[int, int], stated: bool, kind: Format) -> list[str]:
+    """What is to be said of the size of a sensor."""
+    if not stated:
+        return [f"the size is not stated; {size[0]}x{size[1]} holds all events"]
+    if "size" in kind.keeps:
+        return []
+    return [f"{kind.name} does not hold the size, {size[0]}x{size[1]}; readers take the smallest that holds all events"]
 
 
 def writable() -> list[str]:

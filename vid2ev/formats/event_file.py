@@ -89,7 +89,7 @@ class Format:
     longest_us  the latest time after start_us that it can hold; None without limit
     clock_us    the first and the last instant that it can hold, absolute; None without limit
     idle_bytes  a second, about, that it grows by where nothing happens
-    keeps       what it holds beside t, x, y, p: of "labels", "frames", "size", "start"
+    keeps       what it holds beside t, x, y, p: of "labels", "frames", "frame times", "size", "start"
     """
 
     name: str

@@ -230,5 +230,5 @@ FORMAT = Format(
     write=write_events,
     largest=((1 << 16) - 1, (1 << 16) - 1),
     idle_bytes=34,  # the index of milliseconds, packed
-    keeps=frozenset({"labels", "size", "start"}),
+    keeps=frozenset({"labels", "frame times", "size", "start"}),
 )
