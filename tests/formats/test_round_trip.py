@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import shutil
+import struct
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,11 @@ from vid2ev.formats import (
 from vid2ev.stream.events import Events
 
 WRITABLE = [name for name in FORMATS if format_named(name).write]
+TEXT = {"rpg": "{0} {1}\n", "dat": "% Width {0}\n", "aedat4": ">{0}<", "evt2": "y {0}x{1}", "evt3": "y {0}x{1}"}
+STATED: dict[str, Callable[[int, int], bytes]] = {  # the size, by format
+    **{name: lambda *size, text=text: text.format(*size).encode() for name, text in TEXT.items()},  # type: ignore[misc]
+    **{name: lambda width, height: struct.pack("<II", height, width) for name in ("ros1", "ros2")},
+}
 CASES = [(name, case) for name in WRITABLE for case in recordings_for(format_named(name))]
 
 
@@ -46,6 +53,24 @@ def test_all_that_is_written_is_read(tmp_path: Path, name: str, case: str) -> No
     assert file.labelled == ("labels" in kind.keeps)
     if file.labelled and len(read):
         np.testing.assert_array_equal(read.label, all_events(recording).label)
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_events_outside_of_the_sensor_are_left_out_and_counted(tmp_path: Path, name: str) -> None:
+    """In all formats alike, of a sensor that says it is narrower than where its events are."""
+    recording = sparse()
+    path, events = written(format_named(name), recording, tmp_path), all_events(recording)
+    old, new = (STATED[name](width, recording.size[1]) for width in (recording.size[0], 100))
+    assert old in path.read_bytes() and len(old) == len(new)
+    path.write_bytes(path.read_bytes().replace(old, new))
+    inside = events.select(events.x < 100)
+    assert 0 < len(inside) < len(events)
+    said = f"{len(events) - len(inside)} events outside of the 100x{recording.size[1]} sensor are left out"
+    file = open_events(path)
+    for _ in range(2):
+        assert_same(Events.concatenate(file.events()), inside)
+        assert file.warnings == [said]
+    assert survey(open_events(path)).count == len(inside) == describe_events(path)["events"]
 
 
 @pytest.mark.parametrize("name", WRITABLE)

@@ -29,7 +29,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from vid2ev.errors import DataError, read_as
-from vid2ev.formats.event_file import BLOCK, PACKETS, Format, Picture, regrouped, within
+from vid2ev.formats.event_file import PACKETS, Format, Picture, regrouped
+from vid2ev.formats.sequential import Sequential
 from vid2ev.stream.events import Events
 
 PACKET = struct.Struct("<hhiiiiii")
@@ -51,18 +52,14 @@ CAMERAS = {
 }
 
 
-class Aedat3Events:
+class Aedat3Events(Sequential):
     """The events and frames of an AEDAT 3.1 file.
 
     Raises DataError for a file that is not there, is compressed, or is damaged.
     """
 
-    labelled = False
-    start_us, says_start = 0, False
-
     def __init__(self, path: Path):
-        self.path = path
-        self.warnings: list[str] = []
+        super().__init__(path)
         with self._opened() as file:
             self._header = _header(file)
             self._packets_at = file.tell()
@@ -81,16 +78,15 @@ class Aedat3Events:
         """Camera and time of writing."""
         return {"camera": self._camera, "written": self._header.get("Start-Time")}
 
-    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
-        """The events with start_us <= t < stop_us."""
-        return regrouped(within(regrouped(self._polarity(), PACKETS), start_us, stop_us), block)
-
     def frames(self) -> Iterator[Picture]:
         """The frames, cut to 8 bits."""
         with self._opened() as file:
             for size, overflows, content in self._packets(file, FRAME):
                 for at in range(0, len(content), size):
                     yield from _picture(content[at : at + size], overflows)
+
+    def _decoded(self) -> Iterator[Events]:
+        return self._all_inside(regrouped(self._polarity(), PACKETS))
 
     def _polarity(self) -> Iterator[Events]:
         with self._opened() as file:

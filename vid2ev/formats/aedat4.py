@@ -31,8 +31,9 @@ import numpy as np
 
 from vid2ev.errors import DataError, read_as
 from vid2ev.formats.aedat4_writer import EVENT, MAGIC, PACKET, START, write_events
-from vid2ev.formats.event_file import BLOCK, PACKETS, Format, Picture, regrouped, within
+from vid2ev.formats.event_file import PACKETS, Format, Picture, regrouped
 from vid2ev.formats.flatbuffers import Table
+from vid2ev.formats.sequential import Sequential
 from vid2ev.stream.events import Events
 
 LARGEST = 1 << 28  # bytes of a packet; those of cameras have less than a megabyte
@@ -50,17 +51,14 @@ class _Stream:
     about: dict[str, str] = field(default_factory=dict)
 
 
-class Aedat4Events:
+class Aedat4Events(Sequential):
     """The events and frames of an AEDAT4 file.
 
     Raises DataError for a file that is not there, has no stream of events, or is damaged.
     """
 
-    labelled = False
-
     def __init__(self, path: Path):
-        self.path = path
-        self.warnings: list[str] = []
+        super().__init__(path)
         with self._opened() as file:
             self._compression, self._table_at, streams = _header(file)
             self._packets_at = file.tell()
@@ -85,15 +83,14 @@ class Aedat4Events:
         """Camera and compression."""
         return {"camera": self._camera, "compression": self._compression}
 
-    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
-        """The events with start_us <= t < stop_us."""
-        return regrouped(within(regrouped(map(_columns, self._raw_events()), PACKETS), start_us, stop_us), block)
-
     def frames(self) -> Iterator[Picture]:
         """The frames; those of more than 8 bits are cut to 8."""
         with self._opened() as file:
             for content in self._packets(file, self._frames):
                 yield _picture(content)
+
+    def _decoded(self) -> Iterator[Events]:
+        return self._all_inside(regrouped(map(_columns, self._raw_events()), PACKETS))
 
     def _raw_events(self) -> Iterator[np.ndarray]:
         with self._opened() as file:

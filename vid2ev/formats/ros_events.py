@@ -25,11 +25,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError, read_as
-from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, within
+from vid2ev.formats.event_file import PACKETS, Picture, Recording, promised, regrouped
 from vid2ev.formats.evt_state import Left, State, said_of
 from vid2ev.formats.ros_messages import CHANNELS, KINDS, EventArray, EventPacket, event_array, event_packet, image
 from vid2ev.formats.rosbag import Topic
-from vid2ev.formats.sequential import leave_out, outside_of
+from vid2ev.formats.sequential import Sequential
 from vid2ev.stream.events import Events
 
 EVENTS_TOPIC, IMAGES_TOPIC = "/dvs/events", "/dvs/image_raw"
@@ -49,16 +49,14 @@ class Bag(Protocol):
         """The messages of topics, each with its topic's name, in the order in which they were recorded."""
 
 
-class RosEvents:
+class RosEvents(Sequential):
     """The events and images of a bag.
 
     Raises DataError for a file that is not there, has no topic of events, or is damaged.
     """
 
-    labelled = False
-
     def __init__(self, path: Path, open_bag: Callable[[Path], Bag]):
-        self.path = path
+        super().__init__(path)
         with read_as(self.path, "a bag"):
             self._bag = open_bag(path)
             self.warnings = self._bag.warnings
@@ -70,19 +68,13 @@ class RosEvents:
             self._topic = events[0]
             self._images = _nearest([t for t in self._bag.topics if KINDS.get(t.type) == "image"], self._topic)
             self.has_frames = self._images is not None
-            self.size: tuple[int, int] | None = None
             self._encoding: str | None = None
-            self.start_us, self.says_start = 0, False
             self._look()
 
     def describe(self) -> dict[str, Any]:
         """Topics and encoding."""
         images = self._images.name if self._images else None
         return {"topic": self._topic.name, "type": self._topic.type, "encoding": self._encoding, "images": images}
-
-    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
-        """The events with start_us <= t < stop_us."""
-        return regrouped(within(regrouped(self._decoded(), PACKETS), start_us, stop_us), block)
 
     def frames(self) -> Iterator[Picture]:
         """The images of the topic next to that of the events."""
@@ -110,7 +102,7 @@ class RosEvents:
                 break
         if self._encoding == "evt3":
             return
-        first = next((int(events.t[0]) for events in self._decoded() if len(events)), stamp_us or 0)
+        first = next((int(events.t[0]) for events in self._unpacked() if len(events)), stamp_us or 0)
         near = stamp_us is not None and first - DAY_US <= stamp_us <= first
         self.start_us, self.says_start = stamp_us if near and stamp_us is not None else first, near
 
@@ -120,6 +112,9 @@ class RosEvents:
             yield decode(content, self._bag.cdr)
 
     def _decoded(self) -> Iterator[Events]:
+        return self._all_inside(regrouped(self._unpacked(), PACKETS))
+
+    def _unpacked(self) -> Iterator[Events]:
         with read_as(self.path, "a bag"):
             words = _Words(self.size or (1 << 11, 1 << 11))
             for message in self._messages():
@@ -129,8 +124,8 @@ class RosEvents:
                     yield words.events(message)
                 else:
                     yield _unpacked(message, self.path)
-            for count, what in said_of(words.left, outside_of(self.size)):
-                leave_out(self.warnings, count, what)
+            for count, what in said_of(words.left, self._outside):
+                self._leave_out(count, what)
 
 
 def _nearest(images: list[Topic], events: Topic) -> Topic | None:

@@ -48,7 +48,9 @@ class Sequential:
 
     def _leave_out(self, count: int, what: str) -> None:
         """Warn that something is not among the events; once, however often the file is read."""
-        leave_out(self.warnings, count, what)
+        text = f"{count} {what} left out"
+        if count and text not in self.warnings:
+            self.warnings.append(text)
 
     def _inside(self, events: Events) -> tuple[Events, int]:
         """The events within the sensor, and the number of the others."""
@@ -58,21 +60,19 @@ class Sequential:
         outside = len(events) - int(np.count_nonzero(kept))
         return (events.select(kept) if outside else events), outside
 
+    def _all_inside(self, blocks: Iterator[Events]) -> Iterator[Events]:
+        """Those of all blocks within the sensor; the others are left out."""
+        outside = 0
+        for block in blocks:
+            events, left = self._inside(block)
+            outside += left
+            yield events
+        self._leave_out(outside, f"{self._outside} are")
+
     @property
     def _outside(self) -> str:
-        return outside_of(self.size)
-
-
-def leave_out(warnings: list[str], count: int, what: str) -> None:
-    """Warn that something is not among the events, but once."""
-    text = f"{count} {what} left out"
-    if count and text not in warnings:
-        warnings.append(text)
-
-
-def outside_of(size: tuple[int, int] | None) -> str:
-    """Events that are of no pixel of a sensor."""
-    return f"events outside of the {size[0]}x{size[1]} sensor" if size else "events of no pixel"
+        """Events that are of no pixel of the sensor."""
+        return f"events outside of the {self.size[0]}x{self.size[1]} sensor" if self.size else "events of no pixel"
 
 
 class Unwrapped:
