@@ -117,6 +117,19 @@ def test_a_part_has_the_frames_of_its_time_and_ends_with_it(recording: Path) -> 
     assert [level for _, level in there] == [2, 3, 4]
 
 
+@pytest.mark.parametrize("name", ["aedat4", "ros1", "ros2"])
+def test_a_part_has_all_frames_of_its_time_in_whatever_order(recording: Path, name: str) -> None:
+    order = np.array([0, 4, 1, 9, 2, 3, 7, 5, 6, 8, 100])
+    pictures = [Picture(START_US + 200_000 * int(k), np.full((3, 4), k, np.uint8)) for k in order]
+    kind, whole = format_named(name), survey(open_events(recording))
+    assert kind.write is not None
+    kind.write(Path("framed"), replace(whole, frames=lambda: iter(pictures), labelled=False))
+    part = Path(f"part{kind.suffix}")
+    reformat("framed", part, name, start_s=0.2, stop_s=1.2)
+    found = [int(picture.pixels[0, 0]) for picture in open_events(part).frames()]
+    assert sorted(found) == [1, 2, 3, 4, 5, 6]
+
+
 def test_times_since_1970_are_no_recording_of_half_a_century(recording: Path) -> None:
     Path("epoch.csv").write_text("t,x,y,p\n1600000000000000,1,2,1\n1600000000500000,3,4,0\n")
     made = reformat("epoch.csv", "epoch.h5")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.formats import survey
+from vid2ev.formats import DEEPEST_US, survey
 from vid2ev.formats.event_file import BLOCK, EventFile, Picture, Recording
 from vid2ev.stream.events import Events
 
@@ -72,7 +72,9 @@ class _Window:
         before: Picture | None = None
         for picture in self._file.frames():
             if self._is_later(picture.t_us):
-                break
+                if self._is_later(picture.t_us - DEEPEST_US):
+                    break
+                continue  # (their times may go back)
             if picture.t_us < self.start_us:
                 before = picture
                 continue
