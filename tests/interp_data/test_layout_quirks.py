@@ -346,6 +346,15 @@ def test_clips_of_a_sequence_count_its_events(tmp_path: Path) -> None:
     np.testing.assert_array_equal(part.off_on, clip.off_on[:, :, 4:20, 8:24])
 
 
+def test_events_that_were_written_again_are_read_again(tmp_path: Path) -> None:
+    """Also by the process that has read what was there before."""
+    written(tmp_path / "seq")
+    open_sequence(tmp_path / "seq").events(STEP_US, 2 * STEP_US)
+    other = events_of(50, STEP_US, 2 * STEP_US, 99)
+    save(tmp_path / "seq", "hsergb", 1, other)
+    same(open_sequence(tmp_path / "seq").events(STEP_US, 2 * STEP_US), other)
+
+
 def test_recorded_clips_are_drawn_from_all_that_can_be_used(tmp_path: Path) -> None:
     written(tmp_path / "short", images=3)
     written(tmp_path / "long", "bsergb", images=12)

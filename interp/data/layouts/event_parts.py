@@ -23,6 +23,7 @@ import numpy as np
 
 from interp.data.layouts.sequence import Placed
 from vid2ev.errors import DataError
+from vid2ev.stamps import Stamp, stamp
 from vid2ev.untrusted import first_line, read_arrays
 
 SCALE = 32.0
@@ -92,7 +93,7 @@ class EventParts:
         return far
 
     def _placed(self, k: int) -> Placed:
-        t, x, y, p = _cached(self.paths[k])
+        t, x, y, p = _cached(self.paths[k], stamp(self.paths[k]))
         return Placed(t, self._pixels(x, self.size[0]), self._pixels(y, self.size[1]), p)
 
     def _pixels(self, values: np.ndarray, side: int) -> np.ndarray:
@@ -146,7 +147,7 @@ def columns_of(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
 
 
 @lru_cache(maxsize=8)
-def _cached(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _cached(path: Path, written: Stamp) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return columns_of(path)
 
 
