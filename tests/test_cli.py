@@ -279,6 +279,16 @@ def test_info_on_everything() -> None:
     assert json.loads(vid2ev("info", "clip.mp4", "--json").stdout)["size"] == [64, 48]
 
 
+def test_scenes_may_have_more_settings_than_fit_into_the_name_of_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = ",".join(["scene:room,size=64x48", *(f"camera.fov_deg={angle}" for angle in range(50, 70))])
+    assert "64x48, " in vid2ev("info", scene).stdout
+    pytest.importorskip("nicegui")
+    served: list[object] = []
+    monkeypatch.setattr("vid2ev.gui.page.serve", lambda *given: served.append(given[0]))
+    vid2ev("gui", scene, "--no-browser", "--port", "0")
+    assert served
+
+
 def test_info_does_not_print_the_lines_of_a_header() -> None:
     """Of AEDAT 2 they may be 186 kB."""
     settings = b"# a setting\r\n" * 9000 + b"# AEChip: Davis346blue\r\n#End Of ASCII Header\r\n"

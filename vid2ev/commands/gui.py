@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import click
 
 SCENE = "scene:spinning-shapes"
@@ -24,7 +26,6 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
     """
     from contextlib import nullcontext, suppress
     from importlib.util import find_spec
-    from pathlib import Path
 
     from vid2ev.errors import UsageError
 
@@ -36,7 +37,7 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
 
     setup = setup_of(source, rig)
     # (options that are entered on the page may put a file or a folder right, such as by times of images)
-    with suppress(UsageError) if Path(setup.source).exists() else nullcontext():
+    with suppress(UsageError) if os.path.exists(setup.source) else nullcontext():
         duration_s(setup)  # (what cannot be read is refused at once)
     port = free_port(host, port)
     shown = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::") else host

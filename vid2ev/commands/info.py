@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +34,7 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     from vid2ev.terminal import lines
 
     path = Path(file)
-    if (path / "manifest.json").is_file():
+    if os.path.isfile(path / "manifest.json"):  # (Path's raise OSError for long names, such as those of scenes may be)
         from vid2ev.recording.manifest import as_stated, read_manifest
 
         found = read_manifest(path)
@@ -44,7 +45,11 @@ def info(file: str, as_json: bool, **options: Any) -> None:
                 *summary.file_facts(path),
                 *summary.speed_facts(found),
             ]
-    elif recognise(path) if path.is_file() else path.is_dir() and holds_events(path) and not holds_pictures(path):
+    elif (
+        recognise(path)
+        if os.path.isfile(path)
+        else os.path.isdir(path) and holds_events(path) and not holds_pictures(path)
+    ):
         found = describe_events(path)
         facts = summary.event_facts(found)
     elif is_list(path):
@@ -66,7 +71,7 @@ def _opened(path: Path, file: str, options: dict[str, Any]) -> Source:
     try:
         return open_source(file, **options)
     except DataError as error:
-        if path.is_file() and path.suffix.lower() in EVENT_SUFFIXES:
+        if os.path.isfile(path) and path.suffix.lower() in EVENT_SUFFIXES:
             raise DataError(
                 f"{path} is named as event files are, but begins as none; it is damaged or something else"
             ) from error
