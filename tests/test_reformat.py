@@ -277,3 +277,6 @@ def test_the_summary_counts_from_the_first_event(tmp_path: Path) -> None:
     source.write_text("t,x,y,p\n7000000,1,1,1\n9000000,2,2,0\n")
     result = run(str(source), str(tmp_path / "late.h5"))
     assert "2 in 2 s" in result.output, result.output
+    source.write_text("t,x,y,p\n7000000,1,1,1\n1234567897654321,2,2,0\n")
+    result = run(str(source), str(tmp_path / "late.aedat4"))
+    assert "2 in 1234567891 s" in result.output, result.output

@@ -180,6 +180,12 @@ def test_a_short_recording_that_says_no_beginning_begins_with_its_first_event(fi
     assert render("b.npz", "-o", "said.mp4", "--by", "duration:1ms")["start_us"] == 0
 
 
+def test_seconds_are_said_without_powers_of_ten() -> None:
+    write(scattered())
+    long = ["events.h5", "-o", "a.png", "--by", "duration:1e9s"]
+    assert "600 in 1000000000 s\n" in CliRunner().invoke(command, long, catch_exceptions=False).stdout
+
+
 def test_folders_of_recordings_and_defaults() -> None:
     write(scattered(), "clip_events/events.h5")
     assert render("clip_events")["path"] == "clip_events.mp4"

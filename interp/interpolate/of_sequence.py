@@ -19,6 +19,7 @@ from interp.representation.dead_time import stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
+from vid2ev.terminal import counted
 
 if TYPE_CHECKING:
     from interp.representation.carried import Look
@@ -88,7 +89,9 @@ class OfSequence:
         latest = np.maximum.accumulate(times)
         rising = [k for k in range(len(times)) if k == 0 or times[k] > latest[k - 1]]
         if left_out := len(times) - len(rising):
-            self.remarks.append(f"{left_out} frames left out, whose time is not after that of the frame before")
+            self.remarks.append(
+                f"{counted(left_out, 'frame')} left out, whose time is not after that of the frame before"
+            )
         start_us, stop_us = (
             None if second is None else int(times[rising[0]]) + round(second * 1e6)
             for second in (options.start_s, options.stop_s)

@@ -44,7 +44,7 @@ def reformat(source: str, target: Path, as_json: bool, quiet: bool, **options: A
         width, height = made["size"]
         facts = [
             ("made", f"{', '.join(made['files'])}: {made['format']}, {summary.short(made['bytes'])}B"),
-            ("events", f"{made['events']:,} in {made['span_us'] / 1e6:.6g} s, {width}x{height} pixels"),
+            ("events", f"{made['events']:,} in {made['span_us'] / 1e6:.10g} s, {width}x{height} pixels"),
             *(("warning", text) for text in made["warnings"]),
         ]
         click.echo(lines(facts))

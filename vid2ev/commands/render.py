@@ -109,6 +109,6 @@ def _facts(made: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         ("made", f"{made['path']}: {pictures}{film}"),
         ("shows", f"{made['view']} by {_of_people(made['by'])}{densest}"),
-        ("events", f"{made['events']:,} in {made['duration_us'] / 1e6:.6g} s"),
+        ("events", f"{made['events']:,} in {made['duration_us'] / 1e6:.10g} s"),
         *(("warning", text) for text in made["warnings"]),
     ]

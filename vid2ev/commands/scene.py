@@ -136,7 +136,7 @@ def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet:
     from vid2ev.scenes.folder import write_scene
     from vid2ev.scenes.source import SceneSource
     from vid2ev.scenes.world import World
-    from vid2ev.terminal import counting
+    from vid2ev.terminal import counted, counting
 
     stem, seed, count = Path(file.name).stem, options["seed"], options["count"]
     output = options["output"] or Path(f"{stem}_scene" + "s" * (count is not None))
@@ -153,7 +153,7 @@ def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet:
             new = write_scene(directory, source, contents, how, report=report, **keep)
         frames, seconds = len(source.instants), source.duration_expected_s
         if not quiet:
-            what = f"{frames:,} frames, {seconds:.3g} s, seed {seed}" if new else "is there already"
+            what = f"{counted(frames, 'frame')}, {seconds:.3g} s, seed {seed}" if new else "is there already"
             click.echo(f"{directory}: {what}")
             if renderer and renderer.describe():
                 click.echo(f"{directory}: {renderer.describe()}")

@@ -128,7 +128,7 @@ class Comparison:
     def _span(self) -> tuple[str, str]:
         first_us, last_us = self.span_us
         size = "x".join(map(str, self.size))
-        return "compared", f"{(last_us - first_us) / 1e6:.6g} s from {first_us} us on, {size}"
+        return "compared", f"{(last_us - first_us) / 1e6:.10g} s from {first_us} us on, {size}"
 
     def __str__(self) -> str:
         return "\n".join(f"{name:<9} {text}" for name, text in self.facts())

@@ -19,6 +19,7 @@ from vid2ev.gui.tasks import converted
 from vid2ev.gui.theme import say
 from vid2ev.making.conversion import default_directory
 from vid2ev.rig.rig_file import rig_text, write_text
+from vid2ev.terminal import counted
 
 
 class Record:
@@ -203,4 +204,4 @@ def _write_rig(setup: Setup, path: Path, overwrite: bool) -> None:
 
 def _count(result: dict[str, Any]) -> str:
     counts = result["counts"]
-    return f"{counts['events']:,} events" if "events" in counts else f"{counts.get('exposures', 0):,} frames"
+    return counted(counts["events"], "event") if "events" in counts else counted(counts.get("exposures", 0), "frame")

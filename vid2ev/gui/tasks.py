@@ -10,6 +10,7 @@ from typing import Any
 from vid2ev.gui.command import options_of
 from vid2ev.gui.jobs import Tell
 from vid2ev.gui.setup import Setup
+from vid2ev.terminal import counted
 
 EVERY_S = 0.1  # a report, at most
 
@@ -26,7 +27,8 @@ def converted(tell: Tell, setup: Setup, directory: str, overwrite: bool = False)
         nonlocal told_s
         if time.monotonic() - told_s > EVERY_S:
             told_s = time.monotonic()
-            tell(done.frames, recipe.source.frames_expected, f"{done.frames} frames, {done.events:,} events")
+            said = f"{counted(done.frames, 'frame')}, {counted(done.events, 'event')}"
+            tell(done.frames, recipe.source.frames_expected, said)
 
     tell(0, None, "opening the source")
     with tempfile.TemporaryDirectory() as folder:
@@ -52,7 +54,7 @@ def planned(tell: Tell, setup: Setup) -> dict[str, Any]:
             for instant in coming:
                 look.see(instant)
                 seen += instant.original
-                tell(seen, recipe.source.frames_expected, f"{seen} frames")
+                tell(seen, recipe.source.frames_expected, counted(seen, "frame"))
     return look.plans("auto", TOLERANCE)
 
 
