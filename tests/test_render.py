@@ -374,7 +374,9 @@ def test_what_is_there_is_kept_unless_told_otherwise() -> None:
     ("sentence", "arguments"),
     [
         ("expected one of polarity", ["--view", "colours"]),
-        ("representation", ["--view", "voxel:0"]),
+        ("view 'voxel:0': expected 1 to 1000 bins, such as voxel:5", ["--view", "voxel:0"]),
+        ("view 'accumulated:x': expected events for full white, such as accumulated:2", ["--view", "accumulated:x"]),
+        ("view 'polarity:3': expected one of polarity, accumulated:2, voxel:5", ["--view", "polarity:3"]),
         ("duration:10ms", ["--by", "often"]),
         ("times of the frames", ["--by", "source"]),
         ("leave out one", ["--by", "count:5", "--speed", "2"]),

@@ -149,9 +149,9 @@ def _slicing(by: str | None, fps: Fraction, speed: float | None) -> Slicing:
 
 def _kind(view: str) -> Kind:
     name, colon, rest = view.partition(":")
-    if name not in VIEWS:
-        raise UsageError(f"view '{view}': expected one of {', '.join(VIEWS)}")
-    return parse_representation(VIEWS[name] + colon + rest)
+    if name not in VIEWS or (name == "polarity" and rest):
+        raise UsageError(f"view '{view}': expected one of polarity, accumulated:2, voxel:5, time-surface:30ms")
+    return parse_representation(VIEWS[name] + colon + rest, view)
 
 
 def _recording(

@@ -57,10 +57,13 @@ def parse_us(text: str, within: str) -> Fraction:
     return us
 
 
-def parse_representation(text: str) -> Kind:
-    """What makes the representation of a text for a size (width, height); raises UsageError."""
+def parse_representation(text: str, view: str | None = None) -> Kind:
+    """What makes the representation of a text for a size (width, height); raises UsageError, which speaks of a `view`
+    where it was asked for by such a name."""
     name, _, rest = text.strip().partition(":")
-    request = f"representation '{text}'"
+    request, asked = (f"representation '{text}'", "frame")
+    if view is not None:
+        request, asked = (f"view '{view}'", view.partition(":")[0])
     if name == "counts" and not rest:
         from vid2ev.views.counts import Counts
 
@@ -68,7 +71,7 @@ def parse_representation(text: str) -> Kind:
     if name == "frame":
         from vid2ev.views.frame import Frame
 
-        return partial(Frame, full_scale=_whole(rest or "2", request, "events for full white", "frame:2"))
+        return partial(Frame, full_scale=_whole(rest or "2", request, "events for full white", f"{asked}:2"))
     if name == "voxel":
         return _voxel(rest, request)
     if name == "time-surface":
