@@ -42,7 +42,7 @@ def columns_of(kind: str, **others: Any) -> Columns:
 stored = pytest.mark.parametrize("write", [as_npz, as_dsec])
 
 
-@pytest.mark.parametrize("kind", ["uint16", "int32", "int64", "float32", "float64"])
+@pytest.mark.parametrize("kind", ["int8", "uint16", "int32", "int64", "float16", "float32", "float64"])
 @stored
 def test_whole_numbers_of_any_type_are_those_that_they_are(
     write: Callable[[Path, Columns], Path], kind: str, tmp_path: Path
@@ -50,6 +50,16 @@ def test_whole_numbers_of_any_type_are_those_that_they_are(
     events = next(open_events(write(tmp_path, columns_of(kind))).events())
     assert events.t.tolist() == [10, 20, 30] and events.x.tolist() == [1, 2, 3] and events.y.tolist() == [4, 5, 6]
     assert events.p.tolist() == [1, 0, 1]
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+@pytest.mark.parametrize("kind", ["<i8", ">f4", [(name, "<i4") for name in "txyp"]], ids=str)
+def test_a_table_may_have_any_number_of_events(kind: Any, count: int, tmp_path: Path) -> None:
+    table = np.ones((count, 4) if isinstance(kind, str) else count, kind)
+    np.save(tmp_path / "events.npy", table)
+    np.savez(tmp_path / "events.npz", events=table)
+    for path in tmp_path.iterdir():
+        assert describe_events(path)["events"] == count
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,6 @@ def pixels(path: Path, x: np.ndarray, y: np.ndarray, p: np.ndarray) -> tuple[np.
     if any(values.dtype.kind == "f" and not np.array_equal(values, np.rint(values)) for values in (x, y, p)):
         raise DataError(f"{path} has columns, rows or polarities that are no whole numbers; round them first")
     wide = [values for values in (x, y) if len(values) and values.dtype not in (np.uint8, np.uint16)]
-    if any(values.min() < 0 or values.max() > 0xFFFF for values in wide):
+    if any(values.min() < 0 or values.max().item() > 0xFFFF for values in wide):  # (float16 has no such number)
         raise DataError(f"{path} has columns or rows that are not within 0 ... 65535; get another copy")
     return x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8)

@@ -161,12 +161,12 @@ def _columns(arrays: dict[str, Array]) -> dict[str, tuple[Array, Any]] | None:
     found: dict[str, tuple[Array, Any]] = {}
     table = next((arrays[name] for name in TABLES if name in arrays), None)
     for ours, names in NAMES.items():
-        fields: tuple[str, ...] = (table.dtype.names or ()) if table else ()
+        fields: tuple[str, ...] = (table.dtype.names or ()) if table is not None else ()
         if name := next((name for name in names if name in arrays and len(arrays[name].shape) == 1), None):
             found[ours] = (arrays[name], None)
-        elif table and (field := next((name for name in names if name in fields), None)):
+        elif table is not None and (field := next((name for name in names if name in fields), None)):
             found[ours] = (table, field)
-    if table and not found and len(table.shape) == 2 and table.shape[1] == 4 and not table.dtype.names:
+    if table is not None and not found and len(table.shape) == 2 and table.shape[1] == 4 and not table.dtype.names:
         found = {name: (table, (slice(None), column)) for column, name in enumerate(COLUMNS)}
     kinds = [(array.dtype[key] if isinstance(key, str) else array.dtype).kind for array, key in found.values()]
     return found if set("txyp") <= set(found) and all(kind in "iufb" for kind in kinds) else None
