@@ -216,6 +216,19 @@ def test_what_cannot_be_is_one_sentence(recording: Path, arguments: list[str], e
     assert {path.name for path in Path().iterdir()} == before
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there are no pipes that have names")
+def test_links_and_pipes_are_not_replaced(recording: Path) -> None:
+    """Nor devices, such as /dev/null, which are there for all."""
+    os.mkfifo("pipe")
+    Path("link").symlink_to(recording)
+    Path("nowhere").symlink_to("missing")
+    for name, said in (("pipe", "no file but a pipe"), ("link", "is a link"), ("nowhere", "is a link")):
+        before = Path(name).lstat().st_ino
+        with pytest.raises(UsageError, match=said):
+            reformat(recording, name, "csv", overwrite=True)
+        assert Path(name).lstat().st_ino == before
+
+
 def test_a_full_disk_leaves_what_was_there(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     reformat(recording, "out.csv")
     before = Path("out.csv").read_bytes()
