@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import shutil
 import struct
 import sys
@@ -15,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recordings import all_events, assert_same, events_of, recording_of, recordings_for, sparse, written
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import (
     FORMATS,
     check_holds,
@@ -53,6 +54,20 @@ def test_all_that_is_written_is_read(tmp_path: Path, name: str, case: str) -> No
     assert file.labelled == ("labels" in kind.keeps)
     if file.labelled and len(read):
         np.testing.assert_array_equal(read.label, all_events(recording).label)
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+def test_the_format_that_is_named_instead_of_one_that_cannot_hold_it_can(name: str) -> None:
+    """Whatever the size, the length and the instant, with all other formats tried as well."""
+    for size in ((9, 9), (1 << 11, 9), (9, 1 << 14), (1 << 15, 9), (9, (1 << 16) - 1), (1 << 16, 9)):
+        for duration_us in (0, 1 << 32, 10**14, 10**15, 10**18):
+            for start_us in (-1, 0, 10**15, 1 << 51):
+                try:
+                    check_holds(format_named(name), size, duration_us, start_us)
+                except (UsageError, DataError) as error:
+                    instead = re.search(r"choose --format ([\w-]+)", str(error))
+                    assert instead, error
+                    check_holds(format_named(instead[1]), size, duration_us, start_us)
 
 
 @pytest.mark.parametrize("name", STATED)

@@ -185,39 +185,51 @@ def check_holds(
 ) -> None:
     """Raise UsageError, which names a format that can, unless a format can hold pixels and times as these; DataError
     where times are so far apart that files would be full of nothing: a single damaged one is enough for that."""
-    _check_idle(kind, duration_us or 0)
+    choose = f"choose --format {_holding(size, duration_us or 0)}"
+    _check_idle(kind, duration_us or 0, choose)
     if kind.clock_us and start_us is not None:
-        _check_clock(kind, kind.clock_us, start_us, start_us + (duration_us or 0))
+        _check_clock(kind, kind.clock_us, start_us, start_us + (duration_us or 0), choose)
     if kind.largest and not _has_room(kind, size):
         what, most = f"{size[0]}x{size[1]} pixels", f"{kind.largest[0]}x{kind.largest[1]}"
     elif kind.longest_us is not None and duration_us is not None and duration_us > kind.longest_us:
         what, most = f"{duration_us / 1e6:.10g} s", f"{kind.longest_us / 1e6:.10g} s"
     else:
         return
-    holds = "hdf5" if _has_room(format_named("hdf5"), size) else "npz"
-    raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; choose --format {holds}")
+    raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; {choose}")
+
+
+def _holding(size: tuple[int, int], duration_us: int) -> str:
+    """The name of a format that holds such pixels and times."""
+    kinds = (format_named(name) for name in ("hdf5", "aedat4"))
+    fitting = (kind.name for kind in kinds if _has_room(kind, size) and _idle_bytes(kind, duration_us) <= most_bytes())
+    return next(fitting, "npz")
 
 
 def _has_room(kind: Format, size: tuple[int, int]) -> bool:
     return kind.largest is None or (size[0] <= kind.largest[0] and size[1] <= kind.largest[1])
 
 
-def _check_clock(kind: Format, clock_us: tuple[int, int], first_us: int, last_us: int) -> None:
+def _check_clock(kind: Format, clock_us: tuple[int, int], first_us: int, last_us: int, choose: str) -> None:
     """Raise UsageError where times are beyond those that a format has."""
     if first_us < clock_us[0] or last_us > clock_us[1]:
         raise UsageError(
             f"format {kind.name} cannot hold times from {first_us / 1e6:.10g} to {last_us / 1e6:.10g} s, at least"
-            f" {clock_us[0] / 1e6:.10g} and at most {clock_us[1] / 1e6:.10g} s; choose --format hdf5"
+            f" {clock_us[0] / 1e6:.10g} and at most {clock_us[1] / 1e6:.10g} s; {choose}"
         )
 
 
-def _check_idle(kind: Format, duration_us: int) -> None:
-    """Raise DataError where times when nothing happens would take more than files may."""
-    claimed = kind.idle_bytes * duration_us // 10**6
+def _idle_bytes(kind: Format, duration_us: int) -> int:
+    """What times when nothing happens take."""
+    return kind.idle_bytes * duration_us // 10**6
+
+
+def _check_idle(kind: Format, duration_us: int, choose: str) -> None:
+    """Raise DataError where that would be more than files may take."""
+    claimed = _idle_bytes(kind, duration_us)
     if claimed > most_bytes():
         raise DataError(
             f"{duration_us / 8.64e10:,.0f} days as {kind.name} would take {-(-claimed >> 20):,} MB for times when"
-            f" nothing happens; choose --format aedat4, take a part of it, or if that is meant set {limit_for(claimed)}"
+            f" nothing happens; {choose}, take a part of it, or if that is meant set {limit_for(claimed)}"
         )
 
 
