@@ -16,7 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vid2ev.errors import UsageError, Vid2evError
+from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats import describe_events, open_events, read_events, survey
 from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.formats.hdf5 import write_events
@@ -191,6 +191,28 @@ def test_any_window_of_times_of_others_in_whatever_order_is_found(
     start, stop = (-(1 << 40) if window[0] is None else window[0]), (1 << 40 if window[1] is None else window[1])
     found = Events.concatenate(read_events(tmp_path / "other.h5", *window, block=3))
     np.testing.assert_array_equal(found.x, places[(times >= start) & (times < stop)])
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    places=st.lists(st.integers(0, 100), min_size=1, max_size=9),
+    said=st.sampled_from([0, 1, 50, 99, 100, 101, 1 << 40, (1 << 63) - 1, (1 << 64) - 1]),
+    window=st.tuples(*[st.integers(-9, 10**5)] * 2),
+)
+def test_a_damaged_index_finds_no_other_window(
+    tmp_path: Path, places: list[int], said: int, window: tuple[int, int]
+) -> None:
+    """What it says may be any number; of the largest reading did not end."""
+    events = events_at(np.arange(100) * 1000)
+    write(tmp_path / "events.h5", events, 0, 99_000)
+    with h5py.File(tmp_path / "events.h5", "r+") as file:
+        for place in places:
+            file["ms_to_idx"][place] = said
+    inside = events.select((events.t >= window[0]) & (events.t < window[1]))
+    try:
+        assert_same(Events.concatenate(read_events(tmp_path / "events.h5", *window)), inside)
+    except DataError as error:
+        assert "its ms_to_idx is not of its times" in str(error)
 
 
 @pytest.mark.parametrize(

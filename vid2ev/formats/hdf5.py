@@ -120,6 +120,10 @@ class Hdf5Events:
         low, high = 0, len(t)
         if self._indexed and 0 <= t_us // MS_US < len(file["ms_to_idx"]) - 1:
             low, high = (int(k) for k in file["ms_to_idx"][t_us // MS_US : t_us // MS_US + 2])
+            if not (
+                0 <= low <= high <= len(t) and (low == 0 or t[low - 1] < t_us) and (high == len(t) or t[high] >= t_us)
+            ):
+                raise DataError(f"{self.path} is damaged: its ms_to_idx is not of its times; get another copy")
         while high - low > BLOCK:
             middle = (low + high) // 2
             low, high = (middle + 1, high) if t[middle] < t_us else (low, middle)
