@@ -64,6 +64,16 @@ def test_motion_and_changes_of_light_are_no_cuts(name: str, change: str) -> None
     assert cuts_in([np.abs(light + rng.normal(0, 0.002, light.shape)).astype(F) for light in pictures]) == []
 
 
+@pytest.mark.parametrize("shape", [(24, 24), (27, 84), (40, 84), (84, 40), (31, 200), (32, 91), (160, 240)])
+def test_how_alike_two_pictures_are_does_not_depend_on_those_before(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(0)
+    whole = cv2.resize(rng.uniform(0, 1, (shape[0] // 4, shape[1] // 3)).astype(F), (shape[1] + 6, shape[0]))
+    pair = [cuts.reduced(np.ascontiguousarray(whole[:, x : x + shape[1]])) for x in (0, 6)]
+    fresh, used = (CutDetector(0.15)._dis for _ in range(2))
+    cuts.likeness(*(cuts.reduced(rng.uniform(0, 1, shape).astype(F)) for _ in range(2)), 0.15, used)
+    assert cuts.likeness(*pair, 0.15, fresh) == cuts.likeness(*pair, 0.15, used) < 1
+
+
 def test_what_changes_all_the_time_has_no_shots() -> None:
     rng = np.random.default_rng(0)
     assert cuts_in([rng.uniform(0, 1, (160, 240)).astype(F) for _ in range(6)]) == []
@@ -71,7 +81,7 @@ def test_what_changes_all_the_time_has_no_shots() -> None:
     assert cuts_in([strobe[0], *strobe]) == [2]  # (the first is a cut after a shot that stood still)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (3, 500), (23, 23), (24, 24)])
+@pytest.mark.parametrize("shape", [(1, 1), (3, 500), (23, 23), (24, 24), (27, 84), (31, 500), (500, 31)])
 def test_any_size(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(0)
     cuts_in(list(rng.uniform(0, 1, (3, *shape)).astype(F)))

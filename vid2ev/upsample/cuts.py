@@ -28,6 +28,7 @@ STRUCTURE_NAT = 0.05  # standard deviation of places about their surroundings; l
 PLACE, AROUND = 5, 21  # px: a place, and its surroundings
 TINY = 1e-9  # in place of nothing changed
 LEAST = 24  # px: smaller pictures have too little structure to be told apart
+HALVED_TWICE = 32, 91  # px of both sides, from which on DIS halves a picture twice
 
 
 class CutDetector:
@@ -61,6 +62,10 @@ def likeness(before: np.ndarray, after: np.ndarray, threshold: float, dis: Any) 
     if min(float(detail.std()) for detail in details) < STRUCTURE_NAT:
         return 1.0
     first, second, nat_per_code = codes(before, after)
+    # (of smaller ones, too, it is told where to end: else it goes by the width alone, reads beyond those that are low,
+    # and stays with that for the next pair)
+    short, long = sorted(first.shape)
+    dis.setFinestScale(2 if short >= HALVED_TWICE[0] and long >= HALVED_TWICE[1] else 0)
     changed = cv2.absdiff(first, second) * nat_per_code > threshold / 2
     agreed = agreement(dis.calc(first, second, None), dis.calc(second, first, None))
     one, other = (detail[changed] for detail in details)
