@@ -55,7 +55,7 @@ class OfSource:
         self.channels = 1 if _is_grey(self._about) else 3
         self.bits = 8 if self._about.get("bits", 16) <= 8 or self._about.get("type") == "uint8" else 16
         said = str(self._about.get("transfer", "srgb"))
-        whole = said == "srgb" and "edits" not in self._about
+        whole = said == "srgb" and not self._about.get("edits", {}).get("resized", False)
         self._top = np.float32({"uint8": 255, "uint16": 65535}.get(str(self._about.get("type")), 0) * whole)
         self.bright = said in BRIGHT
         self.curve, self.coded = curve_of_film(said), curve_of(self._about)

@@ -156,6 +156,19 @@ def test_a_part_begins_and_ends_at_frames(tmp_path: Path) -> None:
         np.testing.assert_array_equal(made(tmp_path / f"{name}_out")[0], frames[1])
 
 
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("method", ["linear", "flow"])
+def test_a_part_of_images_is_that_part_of_what_the_whole_becomes(tmp_path: Path, method: str, bits: int) -> None:
+    pictures = [picture.astype(f"u{bits // 8}") * (257 if bits == 16 else 1) for picture in moving(4)]
+    source = images(tmp_path / "in", pictures)
+    whole = [frame.codes for frame in frames(source, multiple=2, method=method)]
+    part = [*frames(source, multiple=2, method=method, options=Options(start_s=STEP_US / 1e6))]
+    assert all(np.array_equal(frame.codes, codes) for frame, codes in zip(part, whole[2:], strict=True))
+    if method == "linear":  # (motion is sought in what is seen)
+        cropped = frames(source, multiple=2, method=method, options=Options(crop="20x30+7+5"))
+        assert all(np.array_equal(frame.codes, codes[5:35, 7:27]) for frame, codes in zip(cropped, whole, strict=True))
+
+
 def test_a_folder_of_frames_is_a_source_again(tmp_path: Path) -> None:
     interpolate(images(tmp_path / "in", moving(3), step_us=120), tmp_path / "out", multiple=4)
     times = [frame.t_ns for frame in open_source(tmp_path / "out").frames()]
