@@ -13,6 +13,7 @@ from interp.data.layouts.sequence import Placed
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.instants import rate_of
 from interp.interpolate.of_source import OfSource
+from interp.interpolate.sensor import sensor_of
 from interp.interpolate.take import Key, Options, refuse_edits
 from interp.representation.dead_time import look_back_us, stated
 from vid2ev import Events
@@ -32,7 +33,8 @@ class FramesBesideEvents(OfSource):
 
     def __init__(self, path: str, options: Options, events: Path):
         super().__init__(path, options, has_events=True)
-        self.contrast, self.dead_time = options.contrast, options.dead_time()
+        sensor = sensor_of(events, options.contrast, options.refractory_us)
+        self.contrast, self.dead_time = sensor.contrast, sensor.dead_time
         self._cursor, self._events_path = EventCursor(events, look_back_us(self.dead_time)), events
         corner, self._guessed = self._cursor.size, self._cursor.file.size is None
         guess = next((size for size in (self.size, self._whole) if all(np.less_equal(corner, size))), corner)
@@ -109,7 +111,8 @@ class OfEventFile:
 
     def __init__(self, path: Path, options: Options):
         refuse_edits(path, options)
-        self.contrast, self.dead_time = options.contrast, options.dead_time()
+        sensor = sensor_of(path, options.contrast, options.refractory_us)
+        self.contrast, self.dead_time = sensor.contrast, sensor.dead_time
         self._cursor, self._path = EventCursor(path, look_back_us(self.dead_time)), path
         if not self._cursor.file.has_frames:
             raise UsageError(f"{path} holds no frames; give their video, with --events {path}, or `vid2ev reconstruct`")

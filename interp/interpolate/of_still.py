@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from interp.interpolate.sensor import sensor_of
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
 from interp.representation.dead_time import look_back_us, stated
@@ -70,7 +71,8 @@ class OfStill:
         corner = int(self._events.x.max()) + 1, int(self._events.y.max()) + 1
         guess = self.size if all(np.less_equal(corner, self.size)) else corner
         self.event_size: tuple[int, int] = stated or guess
-        self.contrast, self.dead_time = options.contrast or (USUAL_NATS, USUAL_NATS), options.dead_time()
+        sensor = sensor_of(events, options.contrast, options.refractory_us)
+        self.contrast, self.dead_time = sensor.contrast or (USUAL_NATS, USUAL_NATS), sensor.dead_time
         self.gaps_expected = 1
         self.remarks = [
             f"a single frame, taken for the mean of the light while its events came: {self._span_us / 1e3:g} ms"
@@ -79,7 +81,7 @@ class OfStill:
         self.remarks += [*said, *(remarks_on_tags(picture, pixels) if options.transfer == "auto" else ())]
         if options.transfer == "auto" and is_mat(events):
             self.remarks.append("its codes are taken for sRGB; of raw frames, --transfer linear says what they are")
-        if not options.contrast:
+        if not sensor.contrast:
             self.remarks.append(f"an event is taken for {USUAL_NATS:g} nat; --contrast says what it stands for")
 
     @property

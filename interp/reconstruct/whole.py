@@ -16,14 +16,15 @@ from interp.interpolate.choice import device_of
 from interp.interpolate.destination import kind_of, manifest_of, places_of
 from interp.interpolate.instants import Number, parse_number
 from interp.interpolate.pictures import Pictures, checked_play
+from interp.interpolate.sensor import sensor_of
 from interp.interpolate.shelf import Shelf
 from interp.interpolate.take import check_contrast, check_second
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
 from interp.reconstruct.made_good import MadeGood
 from interp.reconstruct.of_network import OfNetwork
 from interp.reconstruct.reconstructor import Reconstructor
-from interp.reconstruct.sensor import Sensor, sensor_of
 from interp.representation.dead_time import stated
+from interp.representation.event_counts import USUAL_NATS
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
@@ -94,8 +95,10 @@ def reconstruct(
     file, recording = _window(path, start_s, stop_s)
     size = recording.size
     sensor = sensor_of(path, contrast, refractory_us)
+    stands_for = sensor.contrast or (USUAL_NATS, USUAL_NATS)
     where = device_of(device)
-    made_by, why, about = _choice(network, cutoff_hz, size, sensor, where)
+    plain, why, about = _choice(network, cutoff_hz, size, stands_for, where)
+    made_by = MadeGood(plain, sensor.dead_time, size) if sensor.dead_time else plain
     if told:
         told(f"{made_by.name}: {why}")
     rate = checked_play(play, kind) or (
@@ -108,7 +111,7 @@ def reconstruct(
             "path": str(path),
             "size": list(size),
             "identity": identity(path, besides=places_of(output, kind)),
-            "contrast": list(sensor.contrast),
+            "contrast": list(stands_for),
             "dead_time": stated(sensor.dead_time),
         },
         "part": {"start_s": start_s, "stop_s": stop_s},
@@ -226,7 +229,11 @@ def _remarks(path: Path, file: EventFile, recording: Recording) -> list[str]:
 
 
 def _choice(
-    network: str | Path | None, cutoff_hz: float | None, size: tuple[int, int], sensor: Sensor, device: torch.device
+    network: str | Path | None,
+    cutoff_hz: float | None,
+    size: tuple[int, int],
+    contrast: tuple[float, float],
+    device: torch.device,
 ) -> tuple[Reconstructor, str, dict[str, Any]]:
     """What makes the pictures, why, and what it is, for JSON."""
     if network and cutoff_hz is not None:
@@ -237,10 +244,10 @@ def _choice(
     about: dict[str, Any]
     if path:
         why = "as asked" if asked else "the network that comes with vid2ev"
-        made_by = OfNetwork(path, size, sensor.contrast, device)
+        made_by = OfNetwork(path, size, contrast, device)
         about = {"network": str(path), "sha256": sha256(path), "device": device.type}
     else:
         why = "as asked" if asked else "the best that needs no training"
         cutoff = CUTOFF_HZ if cutoff_hz is None else cutoff_hz
-        made_by, about = HighPass(size, sensor.contrast, cutoff), {"filter": "high-pass", "cutoff_hz": cutoff}
-    return MadeGood(made_by, sensor.dead_time, size) if sensor.dead_time else made_by, why, about
+        made_by, about = HighPass(size, contrast, cutoff), {"filter": "high-pass", "cutoff_hz": cutoff}
+    return made_by, why, about

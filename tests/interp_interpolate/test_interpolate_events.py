@@ -29,9 +29,10 @@ from interp.methods.of_networks import OfEvents
 from interp.methods.one_frame import OneFrame
 from interp.networks import make
 from interp.networks.hdr import Hdr
+from interp.representation.dead_time import DeadTime
 from interp.representation.event_counts import EventCounts
 from interp.weights import save
-from vid2ev import Events, convert, read_events
+from vid2ev import DvsSpec, Events, convert, read_events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import format_named
 from vid2ev.formats.event_file import Picture, Recording
@@ -91,6 +92,31 @@ def test_events_before_a_gap_are_given_where_a_dead_time_is_known(tmp_path: Path
             same(more.select(more.t > start_us), gap)
             assert more.t[0] < start_us or not start_us
             assert more.t[0] > start_us - 16 * 500
+
+
+@pytest.mark.parametrize("kind", ["beside", "folder", "with frames", "still"])
+def test_what_events_of_a_recording_stand_for_it_says_wherever_they_lie(tmp_path: Path, kind: str) -> None:
+    numbers = DvsSpec(threshold_on=0.3, threshold_off=0.2, refractory_us=700).model_dump(mode="json")
+    manifest = json.dumps({"versions": {"vid2ev": "0"}, "sensor": {"parameters": numbers}})
+    made = moving(3)
+    pictures = [Picture(STEP_US * k, np.repeat(frame[..., :1], 3, axis=2)) for k, frame in enumerate(made)]
+    names = {"with frames": ("aedat4", "events.aedat4")}
+    format, name = names.get(kind, ("npz", "events.npz"))
+    path = written(tmp_path / name, drawn(us=2 * STEP_US), format, frames=lambda: iter(pictures))
+    source = images(tmp_path / "in", made[:1] if kind == "still" else made)
+    source = path if kind == "with frames" else source / "000000.png" if kind == "still" else source
+    events = None if kind == "with frames" else tmp_path if kind == "folder" else path
+    plain = open_take(source, Options(events=events))
+    (tmp_path / "manifest.json").write_text(manifest)
+    said, asked = (open_take(source, Options(events=events, contrast=of)) for of in (None, (0.4, 0.5)))
+    assert plain.contrast == ((0.15, 0.15) if kind == "still" else None) and plain.dead_time is None
+    assert said.contrast == (0.2, 0.3) and said.dead_time == DeadTime(700, numbers["refractory"])
+    assert asked.contrast == (0.4, 0.5) and asked.dead_time == said.dead_time
+    path.rename(path.with_stem("other"))  # (of which the manifest does not speak)
+    if kind != "folder":
+        other = path.with_stem("other")
+        source, events = (other, None) if kind == "with frames" else (source, other)
+        assert open_take(source, Options(events=events)).contrast == plain.contrast
 
 
 def test_a_sensor_of_unknown_size_is_that_of_the_frames_if_all_events_are_within(tmp_path: Path) -> None:

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from interp.representation.dead_time import DeadTime
-from interp.representation.event_counts import USUAL_NATS, contrast_of
+from interp.representation.event_counts import contrast_of
 from vid2ev.recording.manifest import as_stated, read_manifest
 
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """Of an event camera: what an OFF and an ON event stand for [nat], and how long a pixel is blind after each."""
+    """Of an event camera: what an OFF and an ON event stand for [nat], and how long a pixel is blind after each; None
+    where nobody knows."""
 
-    contrast: tuple[float, float] = (USUAL_NATS, USUAL_NATS)
+    contrast: tuple[float, float] | None = None
     dead_time: DeadTime | None = None
 
 
-def sensor_of(path: Path, contrast: tuple[float, float] | None, refractory_us: float | None) -> Sensor:
+def sensor_of(path: str | Path, contrast: tuple[float, float] | None, refractory_us: float | None) -> Sensor:
     """That of an event file or a recording's folder; what is asked goes before what the recording says.
 
     Raises UsageError for a refractory period that is none, DataError for a manifest that is none.
     """
-    said = _said(path)
+    said = _said(Path(path))
     return Sensor(contrast or said.contrast, DeadTime.asked(refractory_us, said.dead_time))
 
 
@@ -33,7 +34,7 @@ def _said(path: Path) -> Sensor:
         return Sensor()
     with as_stated(manifest):
         numbers = (read_manifest(manifest).get("sensor") or {"parameters": {}})["parameters"]
-        said = Sensor()
-        if "threshold_on" in numbers:
-            said = replace(said, contrast=contrast_of(numbers))
-        return replace(said, dead_time=DeadTime.of(numbers)) if "refractory_us" in numbers else said
+        return Sensor(
+            contrast_of(numbers) if "threshold_on" in numbers else None,
+            DeadTime.of(numbers) if "refractory_us" in numbers else None,
+        )
