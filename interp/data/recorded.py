@@ -18,6 +18,8 @@ from interp.own_codes import in_srgb
 from interp.representation.carried import over
 from vid2ev.errors import DataError, UsageError
 
+MOST_OPENED = 512  # sequences, each of whose event files are looked through as it is opened; 8 bytes per pixel and less
+
 
 def recorded(settings: ClipSettings, seed: int, number: int, multiple: int) -> Clip:
     """A clip of a recording, drawn for its number: any window, any part of the picture.
@@ -92,7 +94,7 @@ def _coarser(sequence: Sequence) -> int:
     return sequence.size[0] // sequence.event_size[0] if _edge_on_edge(sequence) else 1
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=MOST_OPENED)
 def _opened(folder: str) -> Sequence:
     return open_sequence(folder)
 

@@ -374,6 +374,22 @@ def test_recorded_clips_are_drawn_from_all_that_can_be_used(tmp_path: Path) -> N
         recorded(settings, 0, 0, 32)
 
 
+def test_sequences_are_opened_once_however_many_there_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"{k:02d}" for k in range(40)]
+    for name in names:
+        written(tmp_path / name, images=9)
+    opened = list[str]()
+
+    def noted(folder: str) -> Any:
+        opened.append(Path(folder).name)
+        return open_sequence(folder)
+
+    monkeypatch.setattr("interp.data.recorded.open_sequence", noted)
+    settings = ClipSettings(size=(16, 16), recordings=1, scenes=0, photographs=0, recording_folders=(str(tmp_path),))
+    assert len({recorded(settings, 0, number, 8).about["name"] for number in range(80)}) > 32
+    assert opened == names
+
+
 def test_samples_end_where_pixels_of_coarser_events_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # (else the part of a pixel that is cut off is missing, and the others are stretched over all of the sample)
     for name in ("fine", "coarse", "uneven"):
