@@ -47,8 +47,7 @@ class VideoShot:
             source, begin_s = _opened(name)
             after_s, part = _place(source, name, settings.size, multiple, draw)
             start_s, self._frames = _drawn(source, begin_s, after_s, _wanted(multiple), part, settings.size, name)
-            cuts = CutDetector(THRESHOLD)
-            if not any(cuts.begins_shot(a, b) for a, b in pairwise(self._frames)):
+            if not _is_cut(self._frames):
                 break
         self._multiple, self._before, self._beside = multiple, _before(multiple), beside
         gap_ns = (self._frames[self._before + multiple].t_ns - self._frames[self._before].t_ns) / settings.slowdown
@@ -74,6 +73,13 @@ class VideoShot:
 
         light, luminance = zip(*self.pictures(steps, first, last), strict=True)
         return tuple(torch.from_numpy(np.stack(each)).to(device.light) for each in (light, luminance))  # type: ignore[return-value]
+
+
+def _is_cut(frames: list[Frame]) -> bool:
+    """Whether a new shot begins among frames; of the first two, of which nobody knows what was before, if they are
+    unrelated."""
+    cuts = CutDetector(THRESHOLD)
+    return any(cuts.begins_shot(a, b) or (a is frames[0] and cuts.unrelated) for a, b in pairwise(frames))
 
 
 def _before(multiple: int) -> int:

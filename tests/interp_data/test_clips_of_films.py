@@ -163,6 +163,17 @@ def test_a_film_that_does_not_say_how_long_it_is_is_not_called_short(tmp_path: P
         scenes_of(DatasetSpec(videos=(name,), frames=2))
 
 
+def test_no_shot_ends_among_the_frames_that_event_cameras_watch_before_a_gap(tmp_path: Path) -> None:
+    # (else what a slow pixel still sends of the one before is among the events of a gap that shows nothing of it)
+    shots = np.random.default_rng(0).uniform(0, 1, (2, 4, 5, 1)).repeat(6, axis=1).repeat(6, axis=2)
+    np.savez(tmp_path / "film.npz", frames=shots[[0] * 20 + [1] * 30].repeat(3, axis=3).astype(np.float32), fps=50)
+    settings = ClipSettings(**(FILMS | {"size": (30, 24)}), video_files=(str(tmp_path / "film.npz"),))
+    drawn = [VideoShot(settings, 0, number, SAME, 8) for number in range(60)]
+    firsts = {round(50e-9 * shot._frames[0].t_ns) for shot in drawn}
+    assert {min(firsts), 20} <= firsts and min(firsts) < 9
+    assert not [first for first in firsts if first < 20 <= first + 10]
+
+
 @pytest.mark.skipif(not REAL.exists(), reason="no ../shared/data")
 def test_a_real_film_is_cut_where_nothing_is_cut(tmp_path: Path) -> None:
     settings = ClipSettings(**(FILMS | {"size": (96, 96)}), video_files=(str(REAL),))
