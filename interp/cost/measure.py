@@ -64,9 +64,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Rebuilding:
-    """What was measured.  `sizes` [px] begin with that of the footage, whose frames are scored."""
+    """What was measured.  `sizes` [px] begin with that of the footage, whose frames are scored; that is `sequence`, the
+    first of so many in the source."""
 
     source: str
+    sequence: str
+    first_of: int
     gaps: int
     multiple: int
     sizes: tuple[Size, ...]
@@ -105,6 +108,8 @@ class Rebuilding:
         ]
         return {
             "source": self.source,
+            "sequence": self.sequence,
+            "first_of": self.first_of,
             "gaps": self.gaps,
             "multiple": self.multiple,
             "size": list(self.sizes[0]),
@@ -146,7 +151,8 @@ def rebuilding(
     if multiple < 2 or gaps < 1 or repeats < 1:
         raise UsageError(f"{multiple} times the frames, {gaps} gaps, {repeats} repeats: expected at least 2, 1 and 1")
     protocol = Protocol(multiple - 1, multiple - 1)
-    footage = footage_of([source], protocol, simulated or Simulated.of("clean"), gaps).footage[0]
+    several = footage_of([source], protocol, simulated or Simulated.of("clean"), gaps).footage
+    footage = several[0]
     check_simulated([footage], simulated)
     groups = list(footage.groups())
     if not groups:
@@ -167,7 +173,8 @@ def rebuilding(
             gap, times = _brought_to(groups[len(groups) // 2], size, protocol, device)
             for row, taken in zip(rows, _timed(methods, gap, times, repeats, turns, clock), strict=True):
                 row.ms[size] = taken
-    return Rebuilding(source, len(groups), multiple, every, device, used, tuple(rows))
+    of = source, footage.name, len(several)
+    return Rebuilding(*of, len(groups), multiple, every, device, used, tuple(rows))
 
 
 @contextmanager

@@ -32,7 +32,8 @@ def table(found: Rebuilding) -> str:
         lines.append([mark, row.way.name, _figure(row.psnr, 2), _figure(row.ssim, 4), *times, _asked(row)])
     width, height = found.sizes[0]
     gaps, threads = counted(found.gaps, "gap"), counted(found.threads, "thread")
-    said = f"{found.source}: {gaps}, x{found.multiple}, scored at {width}x{height}; ms per frame, {threads}"
+    of = f"{found.source}, {found.sequence}, the first of {found.first_of}" if found.first_of > 1 else found.source
+    said = f"{of}: {gaps}, x{found.multiple}, scored at {width}x{height}; ms per frame, {threads}"
     took = best.time(found.sizes[0])
     recommended = f"as good as the best, and fastest: {best.way.name} ({best.way.asked}), {took:.3g} ms per frame"
     return "\n".join([said, "", *columns(lines), "", recommended])

@@ -62,6 +62,16 @@ def test_the_scores_are_those_of_an_evaluation(quick: None, tmp_path: Path) -> N
         assert re.search(said, table(replace(found, gaps=many, threads=many)))
 
 
+def test_which_of_several_sequences_was_taken_is_said(quick: None, tmp_path: Path) -> None:
+    for name in ("b", "a"):
+        np.savez(tmp_path / f"{name}.npz", frames=np.random.default_rng(0).random((9, 24, 32, 3), np.float32), fps=240)
+    found = rebuilding(str(tmp_path), gaps=1, sizes=[], repeats=1)
+    assert (found.describe()["sequence"], found.describe()["first_of"]) == ("a", 2)
+    assert f"{tmp_path}, a, the first of 2: 1 gap, " in table(found)
+    found = rebuilding(str(tmp_path / "b.npz"), gaps=1, sizes=[], repeats=1)
+    assert found.describe()["first_of"] == 1 and f"{tmp_path / 'b.npz'}: 1 gap, " in table(found)
+
+
 def test_times_are_those_of_the_clock_per_frame(quick: None) -> None:
     ticks, asked = count(), list[tuple[int, int, str]]()
     found = rebuilding(
