@@ -65,6 +65,12 @@ class KeptRows:
                 file.flush()
                 os.fsync(file.fileno())
 
+    def forget(self, sequence: str, method: str) -> None:
+        """The rows of a method are to be made again."""
+        path = self._path(sequence, method)
+        with writing(path):
+            path.unlink()
+
     def about(self, sequence: str) -> dict[str, Any] | None:
         """What is known of a sequence all groups of which are done for some methods; None before.  Raises DataError."""
         path = self.folder / KEPT / sequence / ABOUT

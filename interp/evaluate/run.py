@@ -31,7 +31,7 @@ from interp.evaluate.scoring import conditions_of, rows_of
 from interp.evaluate.sets import Found, check_simulated, footage_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
-from interp.evaluate.worst import WorstPictures, prune
+from interp.evaluate.worst import WorstPictures, lost, prune
 from interp.methods import METHODS
 from vid2ev.cluster.task import Task, Tell, share_of
 from vid2ev.cluster.work import Share, outcomes
@@ -116,6 +116,7 @@ def evaluate(
     }  # fmt: skip
     with Kept(folder, job, {method.name: method.identity for method in methods}, resume) as kept:
         frames = len(protocol.positions)
+        _forget_unseen(found.footage, methods, kept)
         if not workers.alone:
             _share_out(found.footage, methods, frames, kept, workers, share)
             report = None
@@ -149,6 +150,15 @@ def _check(methods: Sequence[Rebuilder]) -> None:
     names = [method.name for method in methods]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise UsageError(f"two methods are called '{twice}': expected names that differ; rename a file or folder")
+
+
+def _forget_unseen(footage: Sequence[Footage], methods: Sequence[Rebuilder], kept: Kept) -> None:
+    """Have sequences scored again by methods, where pictures of their worst frames are gone."""
+    for method in methods:
+        of = {each.name: kept.rows(each.name, method.name) for each in footage}
+        known = [row for groups in of.values() for rows in groups.values() for row in rows]
+        for name in {row.sequence for row in lost(kept.folder, known)}:
+            kept.forget(name, method.name)
 
 
 def _share_out(

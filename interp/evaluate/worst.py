@@ -76,6 +76,11 @@ class WorstPictures:
                 write_codes(path, picture)
 
 
+def lost(folder: Path, rows: Iterable[Row]) -> list[Row]:
+    """The worst of a method's rows of which a picture is not there any more."""
+    return [row for row in worst_of(rows) if not all((folder / name).exists() for name in names_of(row).values())]
+
+
 def remove(folder: Path, row: Row) -> None:
     """Remove the pictures of a row."""
     for name in names_of(row).values():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -135,6 +136,19 @@ def test_rows_that_were_removed_are_made_again(data: Path, whole: dict[str, byte
     more: dict[str, Any] = {"workers": Workers(jobs, retries=0), "share": outcomes} if jobs > 1 else {}
     evaluate(datasets(data), tmp_path / "report", resume=True, **options(data), **more)
     assert contents(tmp_path / "report") == whole
+
+
+@pytest.mark.parametrize(("gone", "jobs"), [("worst", 1), ("worst/firenet", 2), ("worst/linear/b_*_made.png", 1)])
+def test_pictures_of_the_worst_frames_that_were_removed_are_made_again(
+    data: Path, whole: dict[str, bytes], tmp_path: Path, gone: str, jobs: int
+) -> None:
+    evaluate(datasets(data), tmp_path / "report", **options(data))
+    removed = [*(tmp_path / "report").glob(gone)]
+    for path in removed:
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    more: dict[str, Any] = {"workers": Workers(jobs, retries=0), "share": outcomes} if jobs > 1 else {}
+    evaluate(datasets(data), tmp_path / "report", resume=True, **options(data), **more)
+    assert removed and contents(tmp_path / "report") == whole
 
 
 def test_methods_can_be_added_and_other_settings_are_refused(
