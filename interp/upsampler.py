@@ -21,6 +21,7 @@ from interp.methods.of_networks import OfFrames, of_weights
 from interp.methods.tiling import tiling_of
 from vid2ev import Frame
 from vid2ev.errors import UsageError
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.recording.manifest import sha256
 from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval, Subframes, make_upsampler
@@ -91,7 +92,7 @@ def make(
 
 def _codes(light: torch.Tensor) -> torch.Tensor:
     """sRGB codes [C, H, W] of light [H, W] or [H, W, C]."""
-    light = light.nan_to_num(nan=0.0, posinf=1.0)
+    light = light.nan_to_num(nan=0.0, posinf=MOST_OF_HALF_FLOATS)
     planes = light[None] if light.ndim == 2 else light.permute(2, 0, 1)
     return to_codes(planes, "srgb")
 

@@ -61,6 +61,17 @@ def test_infinite_light_that_stays_is_infinite_between_frames(weights: Path, upl
         assert np.array_equal(np.isposinf(np.asarray(frame.light)), np.isposinf(a.light))
 
 
+@pytest.mark.parametrize("first", [False, True])
+def test_light_that_is_infinite_in_one_frame_is_the_most_that_half_floats_hold(weights: Path, first: bool) -> None:
+    made = []
+    for most in (np.inf, 65504):
+        a, b = two_frames(True)
+        (a if first else b).light[3:6, 4:9] = most
+        made.append([frame.light for frame in make_upsampler(f"net:{weights}", 4).between(a, b)][:-1])
+    np.testing.assert_array_equal(*made)
+    assert np.max(made) > 1
+
+
 @pytest.mark.parametrize("colours", [False, True])
 def test_on_a_device_light_stays_there_and_is_the_same(weights: Path, colours: bool) -> None:
     a, b = two_frames(colours)
