@@ -122,7 +122,7 @@ def evaluate(
             report = None
         rows, about = _scored(found.footage, methods, frames, kept, report)
         if not rows:
-            reasons = [*found.unusable.values(), *(_unscored(name, of, protocol) for name, of in about.items())]
+            reasons = [*(_unscored(name, of, protocol) for name, of in about.items()), *found.reasons]
             raise DataError(f"no frame could be scored: {'; '.join(reasons[:3])}")
         for method in methods:
             prune(folder, method.name, rows)

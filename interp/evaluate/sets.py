@@ -29,6 +29,11 @@ class Found(NamedTuple):
     sets: dict[str, list[str]]
     unusable: dict[str, str]
 
+    @property
+    def reasons(self) -> list[str]:
+        """Why each that cannot be used cannot, with its name."""
+        return [said if name in said else f"{name}: {said}" for name, said in self.unusable.items()]
+
 
 def footage_of(
     datasets: Sequence[str],
@@ -59,9 +64,10 @@ def footage_of(
             continue
         footage.append(made)
         sets.setdefault(called[dataset], []).append(name)
+    everything = Found(footage, sets, unusable)
     if not footage:
-        raise DataError(f"nothing in {', '.join(datasets)} can be scored: {'; '.join(list(unusable.values())[:3])}")
-    return Found(footage, sets, unusable)
+        raise DataError(f"nothing in {', '.join(datasets)} can be scored: {'; '.join(everything.reasons[:3])}")
+    return everything
 
 
 def _each_once(datasets: Sequence[str]) -> list[str]:

@@ -19,6 +19,7 @@ import vid2ev
 from interp.data.dataset import write_dataset
 from interp.data.dataset_spec import DatasetSpec
 from interp.data.layouts import open_sequence, sequences_in
+from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.own import Own
 from interp.evaluate.films import Film
 from interp.evaluate.pairing import paired
@@ -395,6 +396,11 @@ def test_videos_in_a_folder_of_recordings_are_named(tmp_path: Path) -> None:
     assert found.unusable == {
         str(tmp_path / "data" / "film.npz"): "no recording, in a folder of such; give it by itself"
     }
+    with pytest.raises(DataError, match=r": seq: 9 frames, expected 10 .* --skip; .*film\.npz: no recording, in a "):
+        evaluate([tmp_path / "data"], tmp_path / "report", protocol=Protocol(8, 8))
+    shutil.rmtree(tmp_path / "data" / "seq" / LAYOUTS["hsergb"].events)
+    with pytest.raises(DataError, match=r"can be scored: .*seq: no folder events_\w+; .*film\.npz: no recording, in"):
+        footage_of([str(tmp_path / "data")], Protocol(), Simulated.of("clean"))
 
 
 def test_what_is_not_there_and_events_alone_are_refused_as_such(tmp_path: Path) -> None:
