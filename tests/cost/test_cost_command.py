@@ -136,6 +136,15 @@ def test_what_cannot_be_converted_is_refused_before_anything_is_tried(
     assert not Path("out").exists()
 
 
+@pytest.mark.parametrize("device", ["auto", "cpu"])
+def test_settings_are_timed_on_the_cpu_and_other_devices_say_so(clip: str, device: str) -> None:
+    asked = [clip, *COMMON, "--no-preview", "--device", device, "--budget", "time=1e-9x"]
+    refused = [call(convert, *asked, *more) for more in ([], ["-q"])]
+    assert [each.exit_code for each in refused] == [2, 2]
+    said = ["timed on the CPU, whatever --device converts on" in each.stderr for each in refused]
+    assert said == [device != "cpu", False]
+
+
 def test_truth_is_written_within_a_budget_as_without(clip: str) -> None:
     asked = [clip, *COMMON, "--no-preview", "--depth", "plane:2", "--truth", "depth", "--truth-rate", "100"]
     done = call(convert, *asked, "-o", "out", "--budget", "vR=1")

@@ -113,8 +113,9 @@ from vid2ev.commands.worker_options import worker_options
 )  # fmt: skip
 @click.option(
     "--budget", metavar="LIMIT[,LIMIT...]",
-    help="Try settings on a short stretch first and take the fastest within limits of error, such as vR=0.05 or us=50,"
-    " and of time, such as time=10x (`vid2ev cost` shows all). What is given explicitly stays as it is.",
+    help="Try settings on a short stretch first, on the CPU, and take the fastest within limits of error, such as"
+    " vR=0.05 or us=50, and of time, such as time=10x (`vid2ev cost` shows all). What is given explicitly stays as it"
+    " is.",
 )  # fmt: skip
 @click.option("--labels", is_flag=True, help="Store the cause of each event (signal, shot, leak, hot).")
 @click.option(

@@ -116,7 +116,9 @@ def _within(
             checked(video, directory, options, Budget.parse(budget))
         rest = dict(options)
         Outputs.taken_from(rest)
-        threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
+        threads, *_, device = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
+        if device != "cpu" and not quiet:
+            click.echo(f"budget {budget}: settings are timed on the CPU, whatever --device converts on", err=True)
         with pass_bar(quiet) as report:
             choice = chosen(video, budget, rest, given=named, threads=threads, report=report)
     if not quiet:
