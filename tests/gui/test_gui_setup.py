@@ -152,6 +152,23 @@ def test_a_source_that_is_none_is_refused_and_changes_nothing(
     session.close()
 
 
+def test_the_pixel_that_is_followed_is_that_of_its_camera_whatever_its_number() -> None:
+    setup = setup_of(SMALL)
+    second = setup.with_rig((*setup.rig.cameras, Camera(name="dvs2", kind="dvs")))
+    session = Session(second)
+    session.look(pixel=(2, 5, 7))
+    for other, followed in (
+        (second.with_rig(second.rig.cameras[1:]), (1, 5, 7)),
+        (second.with_rig(second.rig.cameras[::-1]), (0, 5, 7)),
+        (second.with_sensor_values(0, {"threshold_on": 0.3}), (2, 5, 7)),
+        (setup, None),
+        (second, None),
+    ):
+        assert session.change(lambda other=other: other) is None
+        assert session.request.pixel == followed and session.request.setup == other
+    session.close()
+
+
 def test_a_name_that_no_disk_takes_is_refused_in_a_sentence() -> None:
     session = Session(setup_of(SMALL))
 
@@ -164,6 +181,37 @@ def test_a_name_that_no_disk_takes_is_refused_in_a_sentence() -> None:
     with pytest.raises(OSError, match="File name too long") as failed:
         too_long()
     assert re.fullmatch(why, why_not(failed.value)) and why_not(KeyError("x")) == "KeyError: 'x'"
+    session.close()
+
+
+def test_a_preset_that_is_refused_is_said_and_the_one_in_use_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the file of another camera's sensor is none any more; what was changed of the sensor stays."""
+    testing = pytest.importorskip("nicegui.testing", reason="the extra gui is not installed")
+    from vid2ev.gui.settings import Settings
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NICEGUI_STORAGE_PATH", str(tmp_path / "storage"))
+    file = Path("mine.toml")
+    file.write_text("[cis]\nexposure_us = 100\n")
+    setup = setup_of(SMALL).with_preset(1, "mine.toml").with_sensor_values(0, {"threshold_on": 0.3})
+    session = Session(setup)
+
+    async def choose(name: str) -> tuple[str, list[str]]:
+        async with testing.user_simulation(lambda: Settings(session) and None) as user:
+            await user.open("/")
+            assert user.client
+            drawn = user.client.elements.values()
+            (select,) = (each for each in drawn if each.props.get("data-preset") == "dvs")
+            select.value = name
+            return select.value, user.notify.messages
+
+    file.write_text("[cis]\nexposure_us = -100\n")
+    shown, said = asyncio.run(choose("ideal"))
+    assert shown == "paper" and session.setup == setup and "exposure_us = -100 in sensor mine.toml" in said[0]
+    file.write_text("[cis]\nexposure_us = 100\n")
+    assert asyncio.run(choose("ideal")) == ("ideal", []) and session.setup.rig.cameras[0].sensor == "ideal"
     session.close()
 
 

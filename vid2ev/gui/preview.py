@@ -69,14 +69,15 @@ class Shown:
 
 @dataclass(frozen=True)
 class Answer:
-    """A preview; `start_s` is what was asked for, `course` that of the pixel, `duration_s` how long the whole source
-    lasts.  One that is not `whole` is made of fewer instants than it will be."""
+    """A preview; `start_s` and `pixel` are what was asked for, `course` that of the pixel, `duration_s` how long the
+    whole source lasts.  One that is not `whole` is made of fewer instants than it will be."""
 
     number: int
     start_s: float
     span_s: tuple[float, float]
     duration_s: float | None
     cameras: tuple[Shown, ...]
+    pixel: tuple[int, int, int] | None = None
     course: Course | None = None
     notes: tuple[str, ...] = ()
     whole: bool = True
@@ -149,6 +150,7 @@ class Previewer:
             (1e-9 * ends[0], 1e-9 * ends[1]),
             duration_s(request.setup),
             tuple(cameras),
+            request.pixel,
             self._course(light, request, sensors),
             tuple(notes),
             whole,

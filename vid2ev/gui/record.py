@@ -16,7 +16,7 @@ from vid2ev.gui.loading import WANTED, loaded, loaded_from
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.tasks import converted
-from vid2ev.gui.theme import say
+from vid2ev.gui.theme import refuse, say
 from vid2ev.making.conversion import default_directory
 from vid2ev.rig.rig_file import rig_text, write_text
 from vid2ev.terminal import counted
@@ -164,7 +164,7 @@ class Record:
         """Say that a file is loaded, or why not."""
         self._menu.close()
         if why_not:
-            ui.notify(why_not, type="negative", multi_line=True, timeout=0, close_button=True)
+            refuse(why_not)
         else:
             self._session.look()  # (the files that it names may be others by now)
             ui.notify(f"{name} is loaded", position="bottom-right")

@@ -17,6 +17,7 @@ from vid2ev.gui.tasks import costed, gathered, planned
 from vid2ev.gui.theme import say
 from vid2ev.plan.plan import Plan
 
+NO_PIXEL = "Click a pixel of an event camera to follow it."
 TABS = ("Pixel", "Plan", "World", "Cost", "Compare", "Record")
 
 
@@ -32,7 +33,7 @@ class Results:
                 ui.tab(name)
         with ui.tab_panels(self._tabs, value="Pixel", animated=False).classes("w-full").props("keep-alive"):
             with ui.tab_panel("Pixel"):
-                self._followed = ui.label("Click a pixel of an event camera to follow it.").classes("v-muted")
+                self._followed = ui.label(NO_PIXEL).classes("v-muted")
                 self._course = ui.echart(course_chart(None)).classes("w-full").style("height: 330px")
                 self._course.set_visibility(False)
             with ui.tab_panel("Plan"):
@@ -70,8 +71,11 @@ class Results:
                 self._stage = Stage(self._session, self._select)
 
     def _answered(self, answer: Answer) -> None:
-        pixel = self._session.request.pixel
-        if answer.course is not None and pixel is not None:
+        if answer.pixel is None:
+            self._followed.text = NO_PIXEL
+            self._course.set_visibility(False)
+        elif answer.course is not None:
+            pixel = answer.pixel
             shown = answer.cameras[pixel[0]]
             self._followed.text = f"{shown.name}, pixel {pixel[1]}, {pixel[2]}: {len(answer.course.events)} events"
             self._course.options.clear()

@@ -63,9 +63,17 @@ class Session:
         except OSError as error:
             return why_not(error)
         if setup != self.setup:
-            self.look(setup=setup)
+            self.look(setup=setup, pixel=self._followed(setup))
             self._say("setup", setup)
         return None
+
+    def _followed(self, setup: Setup) -> tuple[int, int, int] | None:
+        """The pixel that is followed, in a setup: of the camera of its name; None where that is gone."""
+        if self.request.pixel is None:
+            return None
+        number, x, y = self.request.pixel
+        before, names = self.setup.rig.cameras[number], [(each.name, each.kind) for each in setup.rig.cameras]
+        return (names.index((before.name, before.kind)), x, y) if (before.name, before.kind) in names else None
 
     def look(self, **what: Any) -> None:
         """Ask for another preview: other fields of the request."""

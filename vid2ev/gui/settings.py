@@ -13,6 +13,7 @@ from vid2ev.gui.scene_edit import things_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stage import CAMERAS
+from vid2ev.gui.theme import refuse
 from vid2ev.rig.camera import Camera
 from vid2ev.scenes.scene_file import scene_names
 from vid2ev.sources import SCENE_PREFIX
@@ -120,11 +121,8 @@ class Settings:
             ui.space()
             presets = [*dict.fromkeys([*kind.names(), setup.preset(number)])]
             ui.select(
-                presets, value=setup.preset(number),
-                on_change=lambda e: self._session.change(lambda: self._session.setup.with_preset(number, e.value)),
-            ).props(
-                f'dense options-dense title="preset" aria-label="preset" data-preset="{names[number]}"'
-            )  # fmt: skip
+                presets, value=setup.preset(number), on_change=lambda e: self._take_preset(number, e.sender, e.value)
+            ).props(f'dense options-dense title="preset" aria-label="preset" data-preset="{names[number]}"')
         ui.label(str(setup.sensor(number).about.get("title", ""))).classes("v-muted mt-1")
         board = SensorBoard(self._session, number)
         panel = Panel(names[number], board.controls, board, grouped=True)
@@ -165,8 +163,15 @@ class Settings:
             ui.button("Reset all", on_click=panel.reset).props("flat dense")
             ui.button("Whole scene as it was", on_click=self._scene_back).props("flat dense")
 
+    def _take_preset(self, number: int, select: ui.select, name: str) -> None:
+        setup = self._session.setup
+        if name == setup.preset(number):  # (brought back)
+            return
+        refuse(self._session.change(lambda: setup.with_preset(number, name)))
+        select.value = self._session.setup.preset(number)
+
     def _scene_back(self) -> None:
-        self._session.change(lambda: self._session.setup.with_scene(None))
+        refuse(self._session.change(lambda: self._session.setup.with_scene(None)))
         self._drawn = None  # (nor is there anything left of what was refused)
         self.show()
 
@@ -180,7 +185,7 @@ class Settings:
         cameras = self._session.setup.rig.cameras
         taken = {camera.name for camera in cameras}
         name = next(f"{kind}{k}" for k in range(2, 1000) if f"{kind}{k}" not in taken)
-        self._session.change(lambda: self._session.setup.with_rig((*cameras, Camera(name=name, kind=kind))))
+        refuse(self._session.change(lambda: self._session.setup.with_rig((*cameras, Camera(name=name, kind=kind)))))
 
     def _remove(self, number: int) -> None:
         cameras = self._session.setup.rig.cameras
@@ -188,7 +193,8 @@ class Settings:
             raise UsageError("a rig has a camera at least")
         kept = tuple(camera for k, camera in enumerate(cameras) if k != number)
         self._place = max(number - 1, 0)
-        self._session.change(lambda: self._session.setup.with_rig(kept))
+        self._camera -= self._camera > number
+        refuse(self._session.change(lambda: self._session.setup.with_rig(kept)))
 
 
 def _places(setup: Setup) -> list[str]:

@@ -16,7 +16,7 @@ from vid2ev.errors import UsageError
 from vid2ev.gui.scene_edit import Thing, moved, pose_at, things_of
 from vid2ev.gui.scene_part import scene_part
 from vid2ev.gui.session import Session
-from vid2ev.gui.theme import ACCENT, MUTED, ON
+from vid2ev.gui.theme import ACCENT, MUTED, ON, refuse
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.scene import LightSource, Object
@@ -159,13 +159,13 @@ class Stage:
         setup = self._session.setup
         way_m = place_m - self._poses[name].translation_m
         if not name.startswith(CAMERAS):
-            self._session.change(lambda: setup.with_scene(moved(setup.settled(), name, way_m)))
+            refuse(self._session.change(lambda: setup.with_scene(moved(setup.settled(), name, way_m))))
             return
         number = [camera.name for camera in setup.rig.cameras].index(name.removeprefix(CAMERAS))
         reference = self._poses["camera" if setup.is_scene else "source"]
         seen = reference.inverse().apply(place_m)
         place_mm = tuple(round(1000 * float(part), 2) for part in seen)
-        self._session.change(lambda: setup.with_camera_values(number, {"translation_mm": place_mm}))
+        refuse(self._session.change(lambda: setup.with_camera_values(number, {"translation_mm": place_mm})))
 
 
 def extents_m(thing: Object) -> tuple[float, float, float]:

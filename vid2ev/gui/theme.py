@@ -85,3 +85,11 @@ def say(label: Any, text: str, bad: bool = False) -> None:
     """Have a quiet label say something, or that something is wrong."""
     label.text = text
     label.classes("v-bad" if bad else "v-muted", remove="v-muted" if bad else "v-bad")
+
+
+def refuse(why: str | None) -> None:
+    """Say why a change was refused, if it was, for as long as nobody has read it."""
+    from nicegui import ui  # (charts, which need no page, have their colours from here)
+
+    if why:
+        ui.notify(why, type="negative", multi_line=True, timeout=0, close_button=True)
