@@ -24,7 +24,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.hdf5 import write_events
 from vid2ev.gui.boards import CameraBoard, SceneBoard
-from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
+from vid2ev.gui.command import SCENE, command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard, is_loopback
 from vid2ev.gui.light import duration_s
 from vid2ev.gui.loading import loaded, loaded_from
@@ -38,6 +38,7 @@ from vid2ev.making.conversion import default_directory
 from vid2ev.reformat import reformat
 from vid2ev.rig.camera import Camera
 from vid2ev.rig.pose import Pose
+from vid2ev.rig.rig_file import rig_text, write_text
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.seen.recipe import Recipe
 from vid2ev.stream.events import Events
@@ -60,10 +61,19 @@ def other_scene(setup: Setup) -> Setup:
     return moved_camera(setup).with_scene(with_values(setup.settled(), "scene", {"ambient": (0.2, 0.3, 0.4)}))
 
 
+def save(setup: Setup, folder: Path) -> None:
+    """Save the files that the command of a setup names, as the page does."""
+    for name in command_of(setup).files:
+        if name == SCENE:
+            write_scene(setup, folder / name)
+        else:
+            write_text(folder / name, rig_text(setup.rig, folder))
+
+
 def parsed(setup: Setup, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """What the recipe would be by the command, given to the shell in a folder that holds its files."""
     command = command_of(setup)
-    command.write(folder)
+    save(setup, folder)
     monkeypatch.chdir(folder)
     context = convert.make_context("convert", shlex.split(str(command))[2:])
     options = dict(context.params)
@@ -413,7 +423,7 @@ def test_a_scene_is_saved_with_its_files_beside_it(tmp_path: Path) -> None:
     here = tmp_path / "here"
     here.mkdir()
     setup = setup_of(f"scene:{own / 'own.toml'}")
-    command_of(setup.with_scene(setup.settled())).write(here)
+    write_scene(setup.with_scene(setup.settled()), here / SCENE)
     shutil.rmtree(own)
     here.rename(tmp_path / "there")
     saved = tmp_path / "there/scene.toml"

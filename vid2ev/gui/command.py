@@ -32,24 +32,13 @@ class Command:
 
     arguments  those after `vid2ev convert`
     files      text of the files that they name, by name
-    setup      what it does
     """
 
     arguments: tuple[str, ...]
     files: Mapping[str, str]
-    setup: Setup
 
     def __str__(self) -> str:
         return shlex.join(["vid2ev", "convert", *self.arguments])
-
-    def write(self, folder: Path, overwrite: bool = False) -> None:
-        """Write the files that the command names.  Raises UsageError where one is in the way, DataError where the disk
-        cannot take it."""
-        for name, text in self.files.items():
-            if name == SCENE:
-                write_scene(self.setup, folder / name, overwrite)
-            else:
-                write_text(folder / name, text, overwrite)
 
 
 def command_of(setup: Setup, output: str | None = None) -> Command:
@@ -66,7 +55,7 @@ def command_of(setup: Setup, output: str | None = None) -> Command:
         words += [f"--{name.replace('_', '-')}", str(value)]
     if output and Path(output) != default_directory(words[0]):
         words += ["-o", str(Path(output))]  # (with a slash at its end it would be the folder for the recording's)
-    return Command(tuple(words), files, setup)
+    return Command(tuple(words), files)
 
 
 def options_of(setup: Setup, folder: Path) -> dict[str, Any]:
