@@ -177,6 +177,41 @@ def test_where_nothing_moves_the_leak_still_sends_events_that_move_with_the_thre
     assert 0.2 < distance(sent(spec, (8, 8), frames), sent(left, (8, 8), frames), (8, 8)) <= bound
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("moving", [0, 3, 384])
+@pytest.mark.parametrize(
+    ("effect", "more"),
+    [("refractory", {"refractory": "track"}), ("refractory", {"timing": "frame"}), ("fixed_rate", {})],
+)
+def test_noise_that_comes_while_a_pixel_is_blind_from_noise_is_bounded(effect: str, more: dict, moving: int) -> None:
+    """Where nothing moves, too: all that is sent is noise."""
+    size, times = (24, 16), range(0, 300_000_000, 5_000_000)
+    across, number = np.arange(24), np.arange(384).reshape(16, 24)
+    for noise, blind_s in (({"shot_rate_hz": 20.0}, 0.02), ({"shot_rate_hz": 100.0}, 0.001),
+                           ({"shot_rate_hz": 5.0, "hot_probability": 0.1, "hot_rate_hz": 100.0}, 0.005)):  # fmt: skip
+        moved = (0.5 * np.exp(0.3 * np.sin(0.8 * (across - 2e-8 * t_ns))) for t_ns in times)
+        frames = [
+            Frame(np.where(number < moving, light, 0.5).astype(np.float32), t_ns)
+            for light, t_ns in zip(moved, times, strict=True)
+        ]
+        how = {"refractory_us": 1e6 * blind_s} if effect == "refractory" else {"frame_rate_hz": 1 / blind_s}
+        spec = DvsSpec(**(NO_POLES | {"threshold_on": 0.2, "threshold_off": 0.2} | noise | how | more))
+        said = EFFECTS[effect].omission(scene_of(spec, size, frames), spec)
+        left = without(spec, effect, said)
+        assert 0.005 < distance(sent(spec, size, frames), sent(left, size, frames), size) <= said.distance
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("step", [0.05, 0.3])
+def test_without_a_readouts_clock_events_are_as_near_each_other_as_light_makes_them(step: float) -> None:
+    lights = [0.3 * math.exp(8 * step * abs(k % 8 - 4)) for k in range(48)]
+    frames = [Frame(np.full((4, 4), light, np.float32), 5_000_000 * k) for k, light in enumerate(lights)]
+    spec = DvsSpec(**NO_POLES, threshold_on=0.1, threshold_off=0.1, refractory_us=0, frame_rate_hz=100)
+    said = EFFECTS["fixed_rate"].omission(scene_of(spec, (4, 4), frames), spec)
+    left = without(spec, "fixed_rate", said)
+    assert 0.5 < distance(sent(spec, (4, 4), frames), sent(left, (4, 4), frames), (4, 4)) <= said.distance
+
+
 def test_by_what_is_argued_of_memories_that_jump_nothing_is_left_out() -> None:
     """Whatever noise there is; the refractory period's own bound is how dense events are, and no estimate."""
     for noise in (0.0, 0.03):

@@ -14,13 +14,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, field_validator
 
+from vid2ev.bounds.distance import together
 from vid2ev.bounds.scene import Omission, Scene
-from vid2ev.physics.omission import omitted
+from vid2ev.physics.omission import by_itself, late_noise, noise_again, omitted
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import clock, entry, events_of
 from vid2ev.stream.ticks import Ticks
@@ -118,9 +120,14 @@ class EventFrames:
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """The readout's clock."""
-    why = "all times are those of the readout; never left out"
-    return omitted(scene, spec, math.inf, f"at most {latest_us(spec):.3g} us", why, lag_s=1e-6 * latest_us(spec))
+    """The readout's clock: without it times are others, those of noise too, and what comes in the same event frame is
+    sent, as near together as it is."""
+    why, figure = "all times are those of the readout; never left out", f"at most {latest_us(spec):.3g} us"
+    free = spec.model_copy(update={"frame_rate_hz": 0.0})
+    dense = max(by_itself(scene, spec), by_itself(scene, free))
+    light = omitted(scene, spec, math.inf, figure, why, lag_s=1e-6 * latest_us(spec), dense=dense)
+    noise = late_noise(scene, spec, latest_us(spec)), noise_again(scene, spec, free, 1.0 / spec.frame_rate_hz)
+    return replace(light, distance=together(light.distance or 0.0, *noise))
 
 
 def latest_us(spec: Any) -> float:

@@ -210,6 +210,24 @@ def noise_events(scene: Scene, spec: Any) -> tuple[float, float]:
     return at_least(least) + hot_least, at_most(most) + at_most(at_most(hot) * hot_s) + _unforced(scene, spec)
 
 
+def noise_soon(scene: Scene, spec: Any, within_s: float) -> float:
+    """How many events of noise follow others of noise of their pixel within a time, on average, at the greatest rate
+    and of as many hot pixels as there may be."""
+    shot_hz, hot_hz = spec.shot_rate_hz, spec.hot_rate_hz
+    hot = at_most(spec.hot_probability * scene.pixels)
+    return within_s * scene.seconds * (scene.pixels * shot_hz**2 + hot * hot_hz * (hot_hz + 2.0 * shot_hz))
+
+
+def noise_again(scene: Scene, spec: Any, without: Any, within_s: float) -> float:
+    """Bound on the distance where those events come to which a sensor is blind, and `without` an effect it is not."""
+    least, _ = noise_events(scene, spec)
+    all_least, all_most = noise_events(scene, without)
+    come = min(at_most(noise_soon(scene, spec, within_s)), all_most)
+    rate_hz = spec.shot_rate_hz + (spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
+    both = crossings(scene) + light_events(scene, spec) + least + all_least
+    return come * (1.0 + 2.0 * DISTANCE_TAU_S * rate_hz) / max(both, 1e-9)
+
+
 def _unforced(scene: Scene, spec: Any) -> float:
     """How many events leak and noise of the photoreceptor send at most; they depend on where levels are."""
     return spec.leak_rate_hz * scene.pixels * scene.seconds + trembling(scene, spec)[0]

@@ -24,8 +24,17 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.bounds.chances import at_most
+from vid2ev.bounds.distance import together
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
-from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
+from vid2ev.physics.omission import (
+    crossings,
+    crowding,
+    light_events,
+    noise_again,
+    noise_events,
+    noise_soon,
+    omitted,
+)
 from vid2ev.physics.slopes import slopes_at, steepest
 from vid2ev.physics.swallowed import swallowed
 from vid2ev.physics.thresholds import soon
@@ -49,6 +58,9 @@ def omission(scene: Scene, spec: Any) -> Omission:
     way = slope * spec.refractory_us * 1e-6
     figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
     any_other = omitted(scene, spec, math.inf, figure, "", dense=_always_open(scene, spec))
+    without = spec.model_copy(update={"refractory_us": 0.0})
+    noise = noise_again(scene, spec, without, spec.refractory_us * 1e-6)
+    any_other = replace(any_other, distance=together(any_other.distance or 0.0, noise))
     if spec.refractory == "track":
         return replace(any_other, why="the memory jumps to the signal when the period ends")
     if spec.timing == "frame":
@@ -62,13 +74,12 @@ def omission(scene: Scene, spec: Any) -> Omission:
         return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
     why = f"a share of {share:.2g} of the crossings may be swallowed"
     why += f", and {noise:.2g} by noise" if noise else ""
-    together = cost / share if share else 1.0
-    gone, noisy = together * at_most(share * scene.events / together), at_most(noise)
-    without = spec.model_copy(update={"refractory_us": 0.0})
+    near = cost / share if share else 1.0
+    gone, noisy = near * at_most(share * scene.events / near), at_most(noise)
     both = crossings(scene) + light_events(scene, spec) + 2.0 * noise_events(scene, without)[0] - noisy
     rate_hz = max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
     dense = 1.0 + 2.0 * DISTANCE_TAU_S * rate_hz * min(rate_hz * spec.refractory_us * 1e-6, 1.0)
-    distance = (gone * together + noisy * dense) / max(both, 1e-9)
+    distance = (gone * near + noisy * dense) / max(both, 1e-9)
     return replace(any_other, distance=float(min(distance, max(any_other.distance or 0.0, dense))), why=why)
 
 
@@ -86,9 +97,7 @@ def _always_open(scene: Scene, spec: Any) -> float:
 def _swallowed_with_noise(scene: Scene, spec: Any) -> float:
     """How many events, at most, follow one of noise, or are of noise and follow another, within the period: on average,
     of events of noise at their greatest rate."""
-    blind_s, light = spec.refractory_us * 1e-6, min(crowding(spec, scene), 1e9) * scene.events
-    hot = spec.hot_probability * spec.hot_rate_hz
-    rate_hz, squared = spec.shot_rate_hz + hot, (spec.shot_rate_hz**2 + hot * (spec.hot_rate_hz + spec.shot_rate_hz))
+    period_s, light = spec.refractory_us * 1e-6, min(crowding(spec, scene), 1e9) * scene.events
+    rate_hz = spec.shot_rate_hz + spec.hot_probability * spec.hot_rate_hz
     leaked = spec.leak_rate_hz * scene.pixels * scene.seconds
-    pairs = 2.0 * (light + leaked) * rate_hz + squared * scene.pixels * scene.seconds
-    return blind_s * pairs
+    return 2.0 * period_s * (light + leaked) * rate_hz + noise_soon(scene, spec, period_s)
