@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 from vid2ev.commands import Commands
 from vid2ev.commands.scene import scene
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.held import Held
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.blender.corners import corners_of
@@ -322,6 +323,24 @@ def test_a_command_that_is_interrupted_goes_on(stand: Stand, tmp_path: Path, mon
     assert vid2ev("--renderer", "blender").exit_code == 0
     assert diary.read_text().split().count("geometry") == 2  # (of four frames)
     assert not Path("out.cycles").exists()
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_what_another_process_renders_for_the_same_place_is_left_alone(
+    stand: Stand, there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From its first request on, before there is a picture; where a scene is to be replaced, too."""
+    monkeypatch.chdir(tmp_path)
+    stand()
+    assert not there or vid2ev("--renderer", "blender").exit_code == 0
+    request = Path("out.cycles/request.json")
+    request.parent.mkdir()
+    request.write_text("{}")
+    with Held(Path("out.new")):
+        second = vid2ev("--renderer", "blender", *["--resume"] * there)
+        assert request.exists() and (second.exit_code == 0 if there else "another vid2ev is writing" in second.stderr)
+    assert vid2ev("--renderer", "blender", "--resume").exit_code == 0
+    assert Path("out").exists() and not Path("out.cycles").exists() and not Path("out.new").exists()
 
 
 def test_errors_of_the_command(stand: Stand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

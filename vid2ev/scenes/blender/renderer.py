@@ -12,7 +12,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -21,6 +21,7 @@ from typing import Self
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.destination import check_folder
 from vid2ev.recording.disk import writing
+from vid2ev.recording.held import Held
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.blender.answer import read_answers
@@ -130,9 +131,15 @@ def renderer_beside(directory: Path, samples: int | None = None, program: str | 
             yield cycles
         except BaseException:
             if not any(folder.glob("*.exr")):
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder, directory)
             raise
-    shutil.rmtree(folder, ignore_errors=True)
+    _remove(folder, directory)
+
+
+def _remove(folder: Path, directory: Path) -> None:
+    """Remove what was rendered for a folder, unless another process is writing that (`disk.whole`): it is its own."""
+    with suppress(UsageError, OSError), Held(directory.with_name(f"{directory.name}.new")):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def render_with_blender(
