@@ -13,7 +13,8 @@ line in `METHODS`.
     both          events integrated from both, with weights 1 - t and t: the complementary filter
     bridge        the same with the drift spread in proportion to events: the closed form to beat
     ramps         the bridge with light on its way between events, instead of in stairs
-    guided        the key frames carried to where the light of the ramps is, and mixed with these as either is in doubt
+    guided        the key frames carried to where the light of the ramps is, or along the motion between them where that
+                  is nearer, and mixed with the ramps as either is in doubt
 """
 
 from __future__ import annotations
@@ -27,8 +28,7 @@ import torch
 
 from interp.candidates.bridge import bridge
 from interp.candidates.ramps import ramps
-from interp.methods.closed_forms import ClosedForm, guided_by_ramps, linear, nearest, of_events
-from interp.methods.flow import flow
+from interp.methods.closed_forms import ClosedForm, flow, guided_by_ramps, linear, nearest, of_events
 from interp.methods.gap import Gap, Method
 from interp.methods.of_networks import of_weights
 from interp.methods.running import PLAIN, Running

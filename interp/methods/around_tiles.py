@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import torch
 
+from interp.candidates.alone import alone
 from interp.candidates.bridge import highest_of
 from interp.candidates.guided import flows_to
 from interp.methods.gap import Gap
@@ -26,7 +27,12 @@ def around_tiles(network: FrameFed, gap: Gap, times: torch.Tensor, tiling: Tilin
     around = Around(whole.frame_0, whole.frame_1, highest, coloured=whole.coloured)
     if network.spec.guided:
         light = _light(network, gap, times, tiling, around)
-        around = replace(around, to_targets=flows_to(whole.frame_0, whole.frame_1, light, network.transfer))
+        frames = whole.frame_0, whole.frame_1
+        around = replace(
+            around,
+            to_targets=flows_to(*frames, light, network.transfer),
+            alone=alone(*frames, times[None], network.transfer),
+        )
     return replace(around, between=sought(whole, network.transfer) if network.seeks_motion else None)
 
 

@@ -12,6 +12,7 @@ from typing import Self
 
 import torch
 
+from interp.candidates.alone import alone, between
 from interp.candidates.bridge import highest_of
 from interp.candidates.guided import SEES_PX, flows_to, guided
 from interp.candidates.ramps import in_doubt, ramps, risen
@@ -58,6 +59,11 @@ def linear(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tens
     return ((time * (gap.frame_1 - gap.frame_0)).add_(gap.frame_0)[None] for time in times)
 
 
+def flow(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tensor]:
+    """Light carried along the motion between both: DIS, forwards and backwards."""
+    return between(gap.frame_0, gap.frame_1, times)
+
+
 def of_events(form: Form) -> Law:
     """Integration of events, pixel by pixel: a form of `interp.candidates`, some images at a time."""
 
@@ -77,15 +83,15 @@ def _guided(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
     frames, footprint = _frames(gap), footprint_over(gap.events, tiling.size)
     seen = _in_strips(_ramps_and_doubt, gap, times)
     images = pictures = seen[None, :, :-1]
-    doubt = seen[None, :, -1:]
+    doubt, by_themselves = seen[None, :, -1:], alone(*frames, times[None])
     for _ in range(1 if footprint == 1 else ROUNDS):
         flows = flows_to(*frames, images, footprint=footprint)
 
         def law(tile: Tile, flows: torch.Tensor = flows) -> torch.Tensor:
-            shown, motion, off = (each[(..., *tile.within)] for each in (pictures, flows, doubt))
+            shown, motion, off, other = (each[(..., *tile.within)] for each in (pictures, flows, doubt, by_themselves))
             corner = None if shown.shape == pictures.shape else (tile.top, tile.left)
             carried = guided(*frames, shown, footprint=footprint, flows=motion, corner=corner)
-            return carried.image(shown, off, times[None])
+            return carried.image(shown, off, other, times[None])
 
         images = tiling.cells(law, SEES_PX * footprint)
     return images[0]

@@ -20,6 +20,7 @@ class Around:
     highest            [B, 1, 1, 1] nat, of both (`candidates.bridge.highest_of`)
     between            [B, 4, H, W] px: motion from the first to the second (x, y) and back
     to_targets         [B, N, 4, H, W] px: from targets to the first, to the second
+    alone              [B, N, C, H, W]: what the frames say alone of the targets (`candidates.alone`), where that counts
     corner             row and column where the part begins
     coloured           both frames in their colours, as of `frame_fed.Pair`
     """
@@ -29,13 +30,15 @@ class Around:
     highest: torch.Tensor
     between: torch.Tensor | None = None
     to_targets: torch.Tensor | None = None
+    alone: torch.Tensor | None = None
     corner: tuple[int, int] = (0, 0)
     coloured: tuple[torch.Tensor, ...] = ()
 
     def of_part(self, size: torch.Size) -> Around:
-        """With the motion of the part alone, of a size (height, width)."""
+        """With what is of the part, of a size (height, width)."""
         rows, columns = (slice(start, start + side) for start, side in zip(self.corner, size, strict=True))
-        between, to_targets = (
-            None if motion is None else motion[..., rows, columns] for motion in (self.between, self.to_targets)
+        between, to_targets, alone = (
+            None if whole is None else whole[..., rows, columns]
+            for whole in (self.between, self.to_targets, self.alone)
         )
-        return replace(self, between=between, to_targets=to_targets)
+        return replace(self, between=between, to_targets=to_targets, alone=alone)

@@ -6,7 +6,17 @@ from dataclasses import dataclass
 
 import torch
 
-from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to, off_by, part_of, recoloured
+from interp.candidates.alone import alone
+from interp.candidates.guided import (
+    SHARP,
+    agreement,
+    carried_off_by,
+    flows_to,
+    nearer,
+    off_by,
+    part_of,
+    recoloured,
+)
 from interp.candidates.ramps import Risen, in_doubt, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import Pair, warped
@@ -23,6 +33,7 @@ class Guide:
     light    C, of the ramps [B, N, C, H, W], codes of this transfer
     found    what events say there
     flows    [B, N, 4, H, W] px, from there to both frames
+    alone    D [B, N, C, H, W]
     wrong    c^2 [B, N, 1, H, W]
     near     [B, 1, 1, H, W], 0 ... 1: where events are
     unsure   [B, N, 1, H, W], 0 ... 1: where events are, and frames carried by these flows are not to be believed
@@ -32,6 +43,7 @@ class Guide:
     light: torch.Tensor
     found: Risen
     flows: torch.Tensor
+    alone: torch.Tensor
     wrong: torch.Tensor
     near: torch.Tensor
     unsure: torch.Tensor
@@ -40,12 +52,16 @@ class Guide:
         """Logits [B, N, 2, H, W] of warps by how near their luminance is."""
         return agreement(warps, self.light, self.transfer)
 
+    def nearer(self, carried: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """J [B, N, C, H, W], of J0 and D, and its logits [B, N, 1, H, W]."""
+        return nearer(carried, self.alone, self.light, self.transfer)
+
     def coloured(self, carried: torch.Tensor) -> torch.Tensor:
         """C' [B, N, C, H, W]: C in the colours of J."""
         return recoloured(self.light, carried, self.transfer)
 
     def carried_off_by(self, agreed: torch.Tensor) -> torch.Tensor:
-        """j^2 [B, N, 1, H, W]; `agreed` are the logits of the frames that make J."""
+        """j^2 [B, N, 1, H, W] of the logits of J."""
         return carried_off_by(agreed, self.wrong)
 
     def offs(self, off: torch.Tensor) -> torch.Tensor:
@@ -75,7 +91,10 @@ def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer, gate: torch.Te
     light = light_at(pair, times, transfer, found)
     flows = None if pair.around is None else pair.around.to_targets
     flows = flows_to(pair.frame_0, pair.frame_1, light, transfer) if flows is None else flows
+    by_themselves = None if pair.around is None else pair.around.alone
+    if by_themselves is None:
+        by_themselves = alone(pair.frame_0, pair.frame_1, times, transfer)
     wrong, _ = off_by(light, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer), transfer)
     carried = carried_off_by(agreement(warped(pair, flows), light, transfer), wrong)
     near = gate[:, None]
-    return Guide(transfer, light, found, flows, wrong, near, near * part_of(carried, wrong).detach())
+    return Guide(transfer, light, found, flows, by_themselves, wrong, near, near * part_of(carried, wrong).detach())

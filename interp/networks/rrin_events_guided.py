@@ -2,7 +2,8 @@
 
     C    = ramps(I0, I1, events)                            luminance at the target, from events (`candidates/ramps.py`)
     F_tk = DIS(C -> I_k) + (1 - m) U2(F_t0, F_t1, I0, I1, C, events)
-    J    = sum_k w_k g(I_k, F_tk)     w_k ~ s_k exp(a_k) V_k     V = sigmoid(U3(F, I0, I1, g0, g1, C, events))^(1 - m)
+    J0   = sum_k w_k g(I_k, F_tk)     w_k ~ s_k exp(a_k) V_k     V = sigmoid(U3(F, I0, I1, g0, g1, C, events))^(1 - m)
+    J    = of J0 and what both frames say alone, by which is nearer to C
     I_t  = C' + m (J - C') + 3 s tanh(r)      C' = C in the colours of J      r, n = U4(I0, I1, J, C', events, c, j)
     m    = c^2 / (c^2 + j^2 e^-n)                  1/s^2 = 1/c^2 + 1/j^2
 
@@ -86,13 +87,13 @@ class RrinEventsGuided(FrameFed):
         correction = self.scale.down(guide.unsure) * run(self.refine, [at, *seen]) * self.spec.flow_scale
         flows = guide.flows + self.scale.flow_up(correction)
         warps = warped(pair, flows)
-        agreed = guide.agreement(warps)
-        logits = self._visible(guide.unsure, warps, [at + correction, *seen]) + agreed
-        carried, weights = blend(warps, logits, shares_at(times))
+        logits = self._visible(guide.unsure, warps, [at + correction, *seen]) + guide.agreement(warps)
+        warped_mix, weights = blend(warps, logits, shares_at(times))
+        carried, agreed = guide.nearer(warped_mix)
         start, off = guide.coloured(carried), guide.carried_off_by(agreed)
         seen = [pair.frame_0, pair.frame_1, carried, start, torch.cat([guide.found.channels(), guide.offs(off)], 2)]
         image = guide.image(start, carried, off, run(self.residue, seen))
-        return Interpolated(image, None, flows, warps, weights, carried)
+        return Interpolated(image, None, flows, warps, weights, warped_mix)
 
     def _visible(self, unsure: torch.Tensor, warps: torch.Tensor, seen: list[torch.Tensor]) -> torch.Tensor:
         """ln V of both warps, [B, N, 2, H, W]."""

@@ -4,7 +4,8 @@ network.
     F_01, F_10 = flow(I0, I1, events?)                                   own, trained before and frozen, or DIS
     F_t0, F_t1 = of these, or by the light that events tell, C           `guide.py`; V then of what agrees as well
     dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, C?, events, reconstructions?)
-    J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says
+    J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says; if C guides,
+                                                                         or D, what frames say alone, if that is nearer
     I_t = J + UNet(I0, I1, J)                                            if refine is unet
         = C' + m (J - C') + 3 s tanh(UNet(I0, I1, J, C', events, c, j))  if C guides
 
@@ -142,15 +143,15 @@ class RrinSlomoEvents(FrameFed):
         at, warps, visible, _ = refined(
             self.combined, pair, times, [guide.light, *beside], self.spec.flow_scale, guide.flows, guide.unsure
         )
-        agreed = guide.agreement(warps)
-        carried, weights = blend(warps, F.logsigmoid(visible) + agreed, shares_at(times))
+        warped_mix, weights = blend(warps, F.logsigmoid(visible) + guide.agreement(warps), shares_at(times))
+        carried, agreed = guide.nearer(warped_mix)
         start, off = guide.coloured(carried), guide.carried_off_by(agreed)
         said = torch.zeros_like(start[:, :, :1]).expand(-1, -1, start.shape[2] + 1, -1, -1)
         if self.residue is not None:
             seen = torch.cat([guide.found.channels(), guide.offs(off)], 2)
             said = run(self.residue, [pair.frame_0, pair.frame_1, carried, start, seen])
         image = guide.image(start, carried, off, said)
-        return Interpolated(image, pair.flows, at, warps, weights, carried)
+        return Interpolated(image, pair.flows, at, warps, weights, warped_mix)
 
     def _flow(self) -> nn.Module:
         spec, bins = self.spec, self.spec.bins if self.spec.flow_input == "frames+events" else 0
