@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -215,8 +214,8 @@ def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None)
     for stretch in ready.stretches(zero_us, len(shelf.done)):
         remark, made = ready.work(stretch)
         times = []
-        with shelf.writing(), shelf.remembering() if memory else nullcontext():
-            for frame in made:
+        with shelf.writing():
+            for frame in _recalled(shelf, made) if memory else made:
                 shelf.put(frame.instant.number, pictures.picture(frame))
                 times.append(frame.instant.t_us)
                 done += 1
@@ -228,6 +227,12 @@ def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None)
             memory = {}  # (from here on it is what this run has made)
     if not shelf.count:
         raise DataError(f"{take.name} holds no frame; give another part of it")
+
+
+def _recalled(shelf: Shelf, made: Iterator[Filled]) -> Iterator[Filled]:
+    """Frames that are made of what was remembered."""
+    with shelf.remembering():
+        yield from made
 
 
 def _expected(take: Take, grid: Grid) -> int | None:

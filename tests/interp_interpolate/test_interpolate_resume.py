@@ -254,6 +254,26 @@ def test_what_was_remembered_and_is_missing_is_named(tmp_path: Path) -> None:
         interpolate(source, tmp_path / "out", resume=True, **given)
 
 
+def test_only_what_does_not_fit_is_said_not_to(tmp_path: Path) -> None:
+    save(tmp_path / "net.safetensors", "firenet", make("firenet"))
+    source = recording(tmp_path / "in", moving(4))
+    given: dict[str, Any] = {"multiple": 2, "network": tmp_path / "net.safetensors", "resume": True}
+
+    def failed(done: int, _: int | None) -> None:
+        if done == 5:
+            raise LookupError("whoever is told")
+
+    for _ in range(2):  # (also in the first stretch of which something is remembered)
+        with pytest.raises(LookupError, match="whoever is told"):
+            interpolate(source, tmp_path / "out", report=failed, **given)
+    (kept,) = (tmp_path / "out.partial").glob("memory-*.npz")
+    with np.load(kept) as found:
+        arrays = {name: each[..., 1:] if each.ndim > 1 else each for name, each in found.items()}
+    np.savez(kept, **arrays)
+    with pytest.raises(DataError, match=rf"{kept.name} does not fit what is asked for .*--overwrite starts again"):
+        interpolate(source, tmp_path / "out", **given)
+
+
 def test_what_was_begun_on_another_device_is_not_gone_on_with(tmp_path: Path) -> None:
     source = images(tmp_path / "in", moving(4))
     with pytest.raises(Stopped):
