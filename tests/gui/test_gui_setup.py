@@ -9,6 +9,7 @@ import shlex
 import shutil
 import socket
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -28,6 +29,7 @@ from vid2ev.gui.command import SCENE, command_of, options_of, sensor_text, write
 from vid2ev.gui.guard import Guard, is_loopback
 from vid2ev.gui.light import duration_s
 from vid2ev.gui.loading import loaded, loaded_from
+from vid2ev.gui.preview import Answer, Shown
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, things_of, value_of, with_place, with_values
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
@@ -176,6 +178,36 @@ def test_the_pixel_that_is_followed_is_that_of_its_camera_whatever_its_number() 
     ):
         assert session.change(lambda other=other: other) is None
         assert session.request.pixel == followed and session.request.setup == other
+    session.close()
+
+
+def test_a_picture_that_is_still_there_is_clicked_for_its_own_camera(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    testing = pytest.importorskip("nicegui.testing", reason="the extra gui is not installed")
+    from vid2ev.gui.pictures import Pictures
+
+    monkeypatch.setenv("NICEGUI_STORAGE_PATH", str(tmp_path / "storage"))
+    setup = setup_of(SMALL)
+    first, second = setup.rig.cameras[0], Camera(name="dvs2", kind="dvs")
+    session = Session(setup.with_rig((first, second)))
+    shown = tuple(Shown(each.name, each.kind, (8, 6), b"", "") for each in session.setup.rig.cameras)
+    drawn = list[Pictures]()
+
+    async def click() -> list[tuple[int, int, int] | None]:
+        async with testing.user_simulation(lambda: drawn.append(Pictures(session))) as user:
+            await user.open("/")
+            drawn[0].show(Answer(1, 0.0, (0.0, 0.1), 1.0, shown))
+            session.change(lambda: setup.with_rig((second,)))
+            drawn[0].show(Answer(1, 0.0, (0.0, 0.1), 1.0, shown))  # (which was on its way)
+            followed, said = [], SimpleNamespace(args={"image_x": 5.5, "image_y": 3.2})
+            for image, *_ in reversed(drawn[0]._cards):
+                (mouse,) = (each for each in image._event_listeners.values() if each.type == "mouse")
+                mouse.handler(said)
+                followed.append(session.request.pixel)
+            return followed
+
+    assert asyncio.run(click()) == [(0, 5, 3), (0, 5, 3)]
     session.close()
 
 

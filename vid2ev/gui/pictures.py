@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from functools import partial
 from typing import Any
 
 from nicegui import ui
@@ -21,7 +22,7 @@ class Pictures:
 
     def __init__(self, session: Session):
         self._session = session
-        self._cards: list[tuple[Any, Any, Any]] = []
+        self._cards: list[tuple[Any, Any]] = []
         self._showing = self._playing = False
         with ui.element("div").classes("v-line"):
             ui.toggle([*VIEWS], value="polarity", on_change=lambda e: session.look(view=e.value)).props(
@@ -47,7 +48,7 @@ class Pictures:
         """Show a preview, and while it plays ask for the next."""
         if [card[0].props["data-camera"] for card in self._cards] != [shown.name for shown in answer.cameras]:
             self._make(answer)
-        for (image, caption, _), shown in zip(self._cards, answer.cameras, strict=True):
+        for (image, caption), shown in zip(self._cards, answer.cameras, strict=True):
             image.set_source(f"data:image/png;base64,{base64.b64encode(shown.picture).decode()}")
             caption.text = shown.caption
         self._marked()
@@ -66,24 +67,25 @@ class Pictures:
         self._grid.style(f"max-width: {len(answer.cameras) * WIDEST_PX}px")
         self._cards = []
         with self._grid:
-            for number, shown in enumerate(answer.cameras):
+            for shown in answer.cameras:
                 with ui.element("div").classes("v-camera"):
                     with ui.element("div").classes("v-line"):
                         ui.label(shown.name).classes("text-sm font-medium")
                         caption = ui.label().classes("v-muted")
-                    image = ui.interactive_image(on_mouse=lambda e, k=number: self._clicked(k, e), cross=False)
+                    image = ui.interactive_image(on_mouse=partial(self._clicked, shown.name, shown.kind), cross=False)
                     image.props(f'data-camera="{shown.name}" role=img aria-label="{shown.name}"').classes("mt-1")
-                    self._cards.append((image, caption, shown.kind))
+                    self._cards.append((image, caption))
 
-    def _clicked(self, camera: int, event: Any) -> None:
-        if self._cards[camera][2] == "dvs":
-            self._session.look(pixel=(camera, int(event.image_x), int(event.image_y)))
+    def _clicked(self, name: str, kind: str, event: Any) -> None:
+        names = [camera.name for camera in self._session.setup.rig.cameras]
+        if kind == "dvs" and name in names:  # (pictures are there until those of other cameras come)
+            self._session.look(pixel=(names.index(name), int(event.image_x), int(event.image_y)))
             self._marked()
 
     def _marked(self) -> None:
-        pixel = self._session.request.pixel
-        for number, (image, *_) in enumerate(self._cards):
-            here = pixel is not None and pixel[0] == number
+        pixel, cameras = self._session.request.pixel, self._session.setup.rig.cameras
+        for image, _ in self._cards:
+            here = pixel is not None and cameras[pixel[0]].name == image.props["data-camera"]
             image.content = _cross(pixel[1], pixel[2]) if here and pixel else ""
 
     def _scrubbed(self, event: Any) -> None:
