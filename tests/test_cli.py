@@ -468,11 +468,15 @@ def test_a_place_that_cannot_be_written() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [["convert", LONG], ["convert", CLIP, "-o", LONG], ["info", LONG], ["render", LONG], ["compare", LONG, LONG],
+    [["convert", LONG], ["convert", CLIP, "-o", LONG], ["render", LONG], ["compare", LONG, LONG],
      ["plan", LONG], ["scene", LONG], ["reformat", LONG, "a.h5"], ["convert", CLIP, "--rig", LONG]],
 )  # fmt: skip
 def test_names_that_no_file_can_have(arguments: list[str]) -> None:
     refused(1, "File name too long; give ", *arguments)
+
+
+def test_info_of_a_name_that_no_file_can_have() -> None:
+    refused(2, "no such file or folder; give a video", "info", LONG)
 
 
 def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -730,7 +734,8 @@ def test_a_terminal_shows_progress() -> None:
 
     ours, theirs = pty.openpty()
     termios.tcsetwinsize(theirs, (24, 110))
-    child = started("convert", CLIP, "-o", "out", *QUICK, stdout=subprocess.PIPE, stderr=theirs)
+    shows = {name: value for name, value in os.environ.items() if name != "TQDM_DISABLE"}
+    child = started("convert", CLIP, "-o", "out", *QUICK, stdout=subprocess.PIPE, stderr=theirs, env=shows)
     os.close(theirs)
     shown = b""
     while child.poll() is None or shown == b"":

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import io
 import sys
+from functools import partial
 
 import numba
 import pytest
 
-from vid2ev.commands.progress import bar
+from vid2ev.commands import progress
 from vid2ev.compiling.heard import telling_of, waiting
 
 
@@ -46,7 +47,8 @@ def test_a_conversion_on_a_terminal_says_that_kernels_are_compiled(
     monkeypatch: pytest.MonkeyPatch, quiet: bool
 ) -> None:
     monkeypatch.setattr(sys, "stderr", screen := Terminal())
-    with bar(quiet, lambda: False):
+    monkeypatch.setattr(progress, "bar_of", partial(progress.bar_of, disable=False))
+    with progress.bar(quiet, lambda: False):
         with waiting():
             assert ("compiling kernels, once" in screen.getvalue()) is not quiet
         assert not screen.getvalue().rpartition("\r")[0].rpartition("\r")[2].strip()  # (and takes that away)
