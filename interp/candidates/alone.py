@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 
 import numpy as np
@@ -28,18 +29,18 @@ def between(
         yield to_codes(channels[None], transfer).to(frame_0)
 
 
-@torch.no_grad()
 @in_full_precision
 def alone(
     frame_0: torch.Tensor, frame_1: torch.Tensor, times: torch.Tensor, transfer: Transfer = "srgb"
 ) -> torch.Tensor:
-    """Frames [B, N, C, H, W] at times [B, N], in any order, from frames [B, C, H, W]."""
-    order = times.argsort()
-    made = [
-        torch.cat([*between(first, last, some[places], transfer)])[places.argsort()]
-        for first, last, some, places in zip(frame_0, frame_1, times, order, strict=True)
-    ]
-    return torch.stack(made)
+    """Frames [B, N, C, H, W] at times [B, N], in any order, from frames [B, C, H, W]; of no gradients."""
+
+    def of_pair(first: torch.Tensor, last: torch.Tensor, some: torch.Tensor) -> torch.Tensor:
+        order = some.argsort()
+        return torch.cat([*between(first, last, some[order], transfer)])[order.argsort()]
+
+    with ThreadPoolExecutor(torch.get_num_threads()) as pool:
+        return torch.stack([*pool.map(of_pair, frame_0.detach(), frame_1.detach(), times)])
 
 
 def _carried(first: Frame, last: Frame, times_ns: Sequence[int]) -> Iterator[np.ndarray]:

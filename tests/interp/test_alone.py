@@ -33,6 +33,12 @@ def test_each_pair_is_by_itself_and_times_come_in_any_order(colours: int) -> Non
         for place, time in enumerate(times[pair]):
             expected = next(between(first[pair], last[pair], time[None]))
             assert torch.equal(made[pair, place], expected[0])
+    threads = torch.get_num_threads()
+    try:
+        torch.set_num_threads(3 if threads == 1 else 1)
+        assert torch.equal(alone(first, last, times), made)
+    finally:
+        torch.set_num_threads(threads)
     torch.testing.assert_close(made[0, 1:3], torch.stack([last[0], first[0]]), atol=1e-6, rtol=0)
 
 
