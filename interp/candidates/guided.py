@@ -76,12 +76,14 @@ GAMMA, DARKEST = 2.2, 0.02  # d code / d ln light = code / 2.2, of codes that ar
 class Guided:
     """Both key frames at N instants.
 
+    shown      [B, N, 1, H, W]: luminance of the pictures that they are guided by (`shown_of`)
     flows      [B, N, 4, H, W] px: from the target to the first frame (x, y), to the second
     warps      [B, N, 2, C, H, W]: the frames, carried
     logits     [B, N, 2, H, W]: -a e, how well each agrees with the luminance that was given
     footprint  k
     """
 
+    shown: torch.Tensor
     flows: torch.Tensor
     warps: torch.Tensor
     logits: torch.Tensor
@@ -100,9 +102,9 @@ class Guided:
         transfer: Transfer = "srgb",
     ) -> torch.Tensor:
         """I at times [B, N], of the pictures that it was guided by, how far their light may be off [nat], and D."""
-        carried, agreed = nearer(self.blend(times), alone, pictures, transfer, self.footprint)
+        carried, agreed = nearer(self.blend(times), alone, self.shown, transfer, self.footprint)
         start = recoloured(pictures, carried, transfer)
-        wrong, seen_wrong = off_by(pictures, doubt, transfer, self.footprint)
+        wrong, seen_wrong = off_by(self.shown, doubt, self.footprint)
         share = part_of(wrong, carried_off_by(agreed, seen_wrong, self.footprint))
         return start + share * (carried - start)
 
@@ -125,7 +127,8 @@ def guided(
     """
     flows = flows_to(frame_0, frame_1, pictures, transfer, footprint) if flows is None else flows
     warps = both_warped(frame_0, frame_1, flows, corner)
-    return Guided(flows, warps, agreement(warps, pictures, transfer, footprint), footprint)
+    shown = shown_of(pictures, transfer)
+    return Guided(shown, flows, warps, agreement(warps, shown, transfer, footprint), footprint)
 
 
 @in_full_precision
@@ -137,50 +140,54 @@ def flows_to(
     footprint: int = 1,
 ) -> torch.Tensor:
     """Motion [B, N, 4, H, W] px from the luminance of pictures to both frames; as `guided`."""
-    shown = averaged(_shown(pictures, transfer), footprint)
-    keys = [averaged(_shown(frame[:, None], transfer), footprint) for frame in (frame_0, frame_1)]
+    shown = averaged(shown_of(pictures, transfer), footprint)
+    keys = [averaged(shown_of(frame[:, None], transfer), footprint) for frame in (frame_0, frame_1)]
     return torch.cat([_flows(shown, key) for key in keys], 2)
 
 
 @in_full_precision
 def motion_between(frame_0: torch.Tensor, frame_1: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
     """Motion [B, 4, H, W] px from each of two frames [B, C, H, W] to the other: of the first, then of the second."""
-    shown = [_shown(frame[:, None], transfer) for frame in (frame_0, frame_1)]
+    shown = [shown_of(frame[:, None], transfer) for frame in (frame_0, frame_1)]
     return torch.cat([_flows(shown[0], shown[1]), _flows(shown[1], shown[0])], 2).squeeze(1)
 
 
 @in_full_precision
+def shown_of(pictures: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
+    """Luminance of pictures [..., C, H, W] as codes [..., 1, H, W], about as differences are seen."""
+    return to_codes(luminance(to_light(pictures, transfer)), "srgb")
+
+
+@in_full_precision
 def agreement(
-    warps: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb", footprint: int = 1
+    warps: torch.Tensor, shown: torch.Tensor, transfer: Transfer = "srgb", footprint: int = 1
 ) -> torch.Tensor:
     """Logits [B, N, K, H, W] of warps [B, N, K, C, H, W] by how far their luminance is from that of pictures."""
-    return _logits(_apart(warps, pictures, transfer, footprint), AROUND_PX, footprint)
+    return _logits(_apart(warps, shown, transfer, footprint), AROUND_PX, footprint)
 
 
 @in_full_precision
 def nearer(
     carried: torch.Tensor,
     alone: torch.Tensor,
-    pictures: torch.Tensor,
+    shown: torch.Tensor,
     transfer: Transfer = "srgb",
     footprint: int = 1,
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """J [B, N, C, H, W] of J0 and D, by which is nearer to pictures; and its logits of agreement [B, N, 1, H, W]."""
+    """J [B, N, C, H, W] of J0 and D, by which is nearer to `shown`; and its logits of agreement [B, N, 1, H, W]."""
     both = torch.stack([carried, alone], 2)
-    apart = _apart(both, pictures, transfer, footprint)
+    apart = _apart(both, shown, transfer, footprint)
     mixed, weights = blend(both, NEARER * _logits(apart, NEARER_PX, footprint), both.new_ones(2))
     return mixed, _logits((weights * apart).sum(2, keepdim=True), AROUND_PX, footprint)  # (nearly linear in codes)
 
 
 @in_full_precision
-def off_by(
-    pictures: torch.Tensor, doubt: torch.Tensor, transfer: Transfer = "srgb", footprint: int = 1
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """c^2, mean squared errors of pictures [B, N, C, H, W] in codes, [B, N, 1, H, W]; and of these averaged alike.
+def off_by(shown: torch.Tensor, doubt: torch.Tensor, footprint: int = 1) -> tuple[torch.Tensor, torch.Tensor]:
+    """c^2, mean squared errors of pictures in codes, [B, N, 1, H, W]; and of these averaged alike.
 
     doubt   how far their light may be off [B, N, 1, H, W] nat
     """
-    per_nat = (_shown(pictures, transfer).clamp(min=DARKEST) / GAMMA) ** 2
+    per_nat = (shown.clamp(min=DARKEST) / GAMMA) ** 2
     wrong = per_nat * _around(doubt**2, DOUBT_PX, footprint)
     if footprint == 1:
         return wrong, wrong
@@ -228,9 +235,9 @@ def dense_flow() -> Any:
     return dis
 
 
-def _apart(warps: torch.Tensor, pictures: torch.Tensor, transfer: Transfer, footprint: int) -> torch.Tensor:
+def _apart(warps: torch.Tensor, shown: torch.Tensor, transfer: Transfer, footprint: int) -> torch.Tensor:
     """By how much luminance of warps is above that of pictures, codes [B, N, K, H, W]."""
-    return averaged(_shown(warps, transfer) - _shown(pictures, transfer)[:, :, None], footprint).squeeze(3)
+    return averaged(shown_of(warps, transfer) - shown[:, :, None], footprint).squeeze(3)
 
 
 def _logits(apart: torch.Tensor, across_px: int, footprint: int) -> torch.Tensor:
@@ -241,11 +248,6 @@ def _logits(apart: torch.Tensor, across_px: int, footprint: int) -> torch.Tensor
 def _around(maps: torch.Tensor, across_px: int, footprint: int) -> torch.Tensor:
     """Means over squares around each pixel of [B, N, K, H, W], of so many pixels of the event camera."""
     return mean_around(maps.flatten(0, 1), across_px * footprint // 2 * 2 + 1).unflatten(0, maps.shape[:2])
-
-
-def _shown(pictures: torch.Tensor, transfer: Transfer) -> torch.Tensor:
-    """Luminance as codes [..., 1, H, W], about as differences are seen."""
-    return to_codes(luminance(to_light(pictures, transfer)), "srgb")
 
 
 def _flows(shown: torch.Tensor, key: torch.Tensor) -> torch.Tensor:

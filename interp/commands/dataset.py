@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +13,6 @@ from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.worker_options import worker_options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from vid2ev.cluster.work import Outcome
     from vid2ev.commands.live import Said
 
@@ -71,9 +68,12 @@ def dataset(
     from interp.data.dataset_spec import DatasetSpec
     from vid2ev.commands.batch import table
     from vid2ev.commands.live import shared_out
+    from vid2ev.commands.progress import interruptible
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.cores import usable_cores
     from vid2ev.errors import UsageError, clause
+    from vid2ev.interrupts import heard
+    from vid2ev.recording.destination import partial_of
     from vid2ev.sources.many import sources_in
     from vid2ev.terminal import counted, counting
 
@@ -89,7 +89,8 @@ def dataset(
         raise UsageError(named + clause(complaint["msg"])) from error
     quiet |= as_json
     share = partial(shared_out, noun="scenes", quiet=quiet, said=_said)
-    with _kept(directory), counting(quiet, SCENES) as report:
+    told = interruptible(directory, (partial_of(directory) / "job.json").exists)
+    with told, heard(), counting(quiet, SCENES) as report:
         facts = write_dataset(directory, spec, resume=resume, workers=workers, share=share, report=report)
     if as_json:
         click.echo(json.dumps(facts, indent=2))
@@ -99,21 +100,6 @@ def dataset(
         click.echo(table([*done, *left]))
         made = (counted(facts[f"{name}s"], name) for name in ("scene", "sample", "event"))
         click.echo(f"{directory}: {', '.join(made)}")
-
-
-@contextmanager
-def _kept(directory: Path) -> Iterator[None]:
-    """What asks it to end within says so if it can be resumed."""
-    from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
-    from vid2ev.interrupts import heard
-    from vid2ev.recording.destination import partial_of
-
-    try:
-        with heard():
-            yield
-    except KeyboardInterrupt:
-        begun = (partial_of(directory) / "job.json").exists()
-        say_interrupted(KEPT if begun else NOT_KEPT)
 
 
 def _said(outcome: Outcome) -> Said:

@@ -18,7 +18,6 @@ from interp.commands.making import (
     device_option,
     event_options,
     film_text,
-    kept,
     run_options,
     what_options,
 )
@@ -149,10 +148,12 @@ def _one(
 ) -> dict[str, Any]:
     """Interpolate a source, `others` perhaps being done already; returns the manifest."""
     from interp.interpolate.whole import interpolate as make
+    from vid2ev.commands.progress import kept
+    from vid2ev.interrupts import heard
     from vid2ev.terminal import lines
 
     tell = None if quiet else lambda text: click.echo(f"by {text}")
-    with kept(path, others), bar(quiet, FRAMES, " frames") as report:
+    with kept(path, "done.jsonl", others=others), heard(), bar(quiet, FRAMES, " frames") as report:
         made = make(source, path, options=taken, report=report, told=tell, **options)
     if not quiet:
         click.echo(lines(_facts(path, made)))

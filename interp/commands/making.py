@@ -10,10 +10,8 @@ from typing import Any
 
 import click
 
-from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
 from vid2ev.commands.options import Finite, adding
-from vid2ev.errors import DataError, UsageError
-from vid2ev.interrupts import heard
+from vid2ev.errors import UsageError
 from vid2ev.requests import number_of
 from vid2ev.terminal import bar_of
 
@@ -84,21 +82,6 @@ def contrast_of(text: str | None) -> tuple[float, float] | None:
             " events, such as 0.2,0.25"
         )
     return values[0], values[-1]
-
-
-@contextmanager
-def kept(path: Path, others: bool = False) -> Iterator[None]:
-    """What goes wrong within, or asks to end, says so if it can be resumed, as `others` that are done can."""
-    from vid2ev.recording.destination import partial_of
-
-    done = partial_of(path) / "done.jsonl"
-    try:
-        with heard():
-            yield
-    except DataError as error:
-        raise DataError(f"{error}{f'; {KEPT}' * done.exists()}") from error
-    except KeyboardInterrupt:
-        say_interrupted(KEPT if others or done.exists() else NOT_KEPT)
 
 
 @contextmanager

@@ -17,7 +17,6 @@ from interp.commands.making import (
     device_option,
     event_options,
     film_text,
-    kept,
     run_options,
     what_options,
 )
@@ -64,12 +63,14 @@ def reconstruct(
     changed.
     """
     from interp.reconstruct.whole import reconstruct as make
+    from vid2ev.commands.progress import kept
+    from vid2ev.interrupts import heard
 
     keep_memory()
     quiet |= as_json
     path = output or _default(events, options["format"])
     tell = None if quiet else lambda text: click.echo(f"by {text}")
-    with kept(path), bar(quiet, EVENTS, " events") as report:
+    with kept(path, "done.jsonl"), heard(), bar(quiet, EVENTS, " events") as report:
         made = make(events, path, contrast=contrast_of(contrast), report=report, told=tell, **options)
     if as_json:
         click.echo(json.dumps(made, indent=2))

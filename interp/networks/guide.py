@@ -16,6 +16,7 @@ from interp.candidates.guided import (
     off_by,
     part_of,
     recoloured,
+    shown_of,
 )
 from interp.candidates.ramps import Risen, in_doubt, ramps, risen
 from interp.light import Transfer
@@ -31,6 +32,7 @@ class Guide:
     """N targets, before a network.
 
     light    C, of the ramps [B, N, C, H, W], codes of this transfer
+    shown    its luminance [B, N, 1, H, W] (`shown_of`)
     found    what events say there
     flows    [B, N, 4, H, W] px, from there to both frames
     alone    D [B, N, C, H, W]
@@ -41,6 +43,7 @@ class Guide:
 
     transfer: Transfer
     light: torch.Tensor
+    shown: torch.Tensor
     found: Risen
     flows: torch.Tensor
     alone: torch.Tensor
@@ -50,11 +53,11 @@ class Guide:
 
     def agreement(self, warps: torch.Tensor) -> torch.Tensor:
         """Logits [B, N, 2, H, W] of warps by how near their luminance is."""
-        return agreement(warps, self.light, self.transfer)
+        return agreement(warps, self.shown, self.transfer)
 
     def nearer(self, carried: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """J [B, N, C, H, W], of J0 and D, and its logits [B, N, 1, H, W]."""
-        return nearer(carried, self.alone, self.light, self.transfer)
+        return nearer(carried, self.alone, self.shown, self.transfer)
 
     def coloured(self, carried: torch.Tensor) -> torch.Tensor:
         """C' [B, N, C, H, W]: C in the colours of J."""
@@ -94,7 +97,9 @@ def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer, gate: torch.Te
     by_themselves = None if pair.around is None else pair.around.alone
     if by_themselves is None:
         by_themselves = alone(pair.frame_0, pair.frame_1, times, transfer)
-    wrong, _ = off_by(light, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer), transfer)
-    carried = carried_off_by(agreement(warped(pair, flows), light, transfer), wrong)
+    shown = shown_of(light, transfer)
+    wrong, _ = off_by(shown, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer))
     near = gate[:, None]
-    return Guide(transfer, light, found, flows, by_themselves, wrong, near, near * part_of(carried, wrong).detach())
+    carried = carried_off_by(agreement(warped(pair, flows), shown, transfer), wrong)
+    unsure = near * part_of(carried, wrong).detach()
+    return Guide(transfer, light, shown, found, flows, by_themselves, wrong, near, unsure)

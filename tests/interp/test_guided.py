@@ -31,6 +31,7 @@ from interp.candidates.guided import (
     off_by,
     part_of,
     recoloured,
+    shown_of,
 )
 from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.light import luminance, to_light
@@ -117,7 +118,7 @@ def test_motion_is_the_same_whoever_looks_for_it() -> None:
 
 def test_what_does_not_agree_counts_little() -> None:
     target = torch.full((1, 1, 3, 20, 20), 0.5)
-    logits = agreement(torch.stack([target, target + 0.2], 2), target)
+    logits = agreement(torch.stack([target, target + 0.2], 2), shown_of(target))
     torch.testing.assert_close(logits[:, :, 0], torch.zeros(1, 1, 20, 20))
     torch.testing.assert_close(logits[:, :, 1], torch.full((1, 1, 20, 20), -40 * 0.2))
 
@@ -129,11 +130,11 @@ def test_of_two_pictures_the_one_counts_that_is_nearer_to_noisy_light(footprint:
     seen, off = truth + 0.03 * torch.randn_like(truth), truth.clone()
     off[..., 30:] += 0.05
     for first, second in ((truth, off), (off, truth)):
-        made, agreed = nearer(first, second, seen, footprint=footprint)
+        made, agreed = nearer(first, second, shown_of(seen), footprint=footprint)
         away = (made - truth).abs()
         assert float(away[..., 45:].max()) < 0.002 > float(away[..., :15].max())
-        torch.testing.assert_close(agreed, agreement(made[:, :, None], seen, footprint=footprint))
-    alike, _ = nearer(seen, seen, truth, footprint=footprint)
+        torch.testing.assert_close(agreed, agreement(made[:, :, None], shown_of(seen), footprint=footprint))
+    alike, _ = nearer(seen, seen, shown_of(truth), footprint=footprint)
     assert torch.equal(alike, seen)
 
 
@@ -149,7 +150,7 @@ def test_what_frames_say_alone_counts_where_events_are_noise() -> None:
 
 
 def share_of(logits: torch.Tensor, pictures: torch.Tensor, doubt: torch.Tensor, footprint: int = 1) -> torch.Tensor:
-    wrong, seen_wrong = off_by(pictures, doubt, footprint=footprint)
+    wrong, seen_wrong = off_by(shown_of(pictures), doubt, footprint=footprint)
     return part_of(wrong, carried_off_by(logits, seen_wrong, footprint))
 
 
@@ -159,7 +160,7 @@ def test_the_mix_is_the_best_of_two_whose_errors_are_independent(doubt: float, w
     torch.manual_seed(0)
     truth = torch.full((1, 1, 1, 200, 200), 0.5)
     seen, carried = truth + doubt * truth / GAMMA * torch.randn_like(truth), truth + wrong * torch.randn_like(truth)
-    share = share_of(agreement(carried[:, :, None], seen), seen, torch.full_like(seen, doubt))
+    share = share_of(agreement(carried[:, :, None], shown_of(seen)), seen, torch.full_like(seen, doubt))
 
     def off(share: torch.Tensor | float) -> float:
         return float((seen + share * (carried - seen) - truth).square().mean())
@@ -230,9 +231,9 @@ def test_what_is_off_and_what_is_believed_is_as_the_docstring_has_it(k: int) -> 
     seen, both, doubts = (
         torch.from_numpy(each).float()[None, None] for each in (picture[None], carried[:, None], doubt[None])
     )
-    found = agreement(both, seen, footprint=k)
+    found = agreement(both, shown_of(seen), footprint=k)
     np.testing.assert_allclose(found[0, 0], logits, atol=1e-4)
-    said = off_by(seen, doubts, footprint=k)
+    said = off_by(shown_of(seen), doubts, footprint=k)
     for mine, theirs in zip((wrong, seen_wrong), said, strict=True):
         np.testing.assert_allclose(mine, theirs[0, 0, 0], rtol=1e-3)
     np.testing.assert_allclose(carried_off_by(found, said[1], k)[0, 0, 0], off, atol=1e-6)
@@ -246,9 +247,8 @@ def test_a_network_says_how_much_to_believe_and_what_is_missing_where_events_are
     n, near = 4 * torch.randn(1, 2, 1, 7, 9), torch.rand(1, 1, 1, 7, 9).round()
     start, carried, r = torch.rand(3, 1, 2, 3, 7, 9)
     unused = torch.zeros(0)
-    guide = Guide(
-        "srgb", unused, risen(EventCounts.none(1, (7, 9)), torch.tensor([[0.5, 0.6]])), unused, unused, c2, near, near
-    )
+    found = risen(EventCounts.none(1, (7, 9)), torch.tensor([[0.5, 0.6]]))
+    guide = Guide("srgb", unused, unused, found, unused, unused, c2, near, near)
     made = guide.image(start, carried, j2, torch.cat([r, n], 2))
     m = c2 / (c2 + j2 * torch.exp(-(n * near).clamp(-10, 10)) + 0.003**2)
     s = (c2 * j2 / (c2 + j2 + 0.003**2)).sqrt()

@@ -49,7 +49,8 @@ def convert_one(
         if dry_run:
             return recipe
     live = is_live(video)
-    with kept(directory, not live, others), heard(gently=live) as check, bar(quiet, check) as report:
+    told = kept(directory, "checkpoint.npz", again=not live, others=others)
+    with told, heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]

@@ -31,24 +31,35 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {
 
 
 @contextmanager
-def kept(directory: Path, again: bool, others: bool) -> Iterator[None]:
-    """What goes wrong within says so if it can be resumed; `again`: the source can be read again.  What was kept and is
-    damaged cannot.  `others` that are done are kept, whatever becomes of this."""
+def kept(path: Path, record: str, *, again: bool = True, others: bool = False) -> Iterator[None]:
+    """What goes wrong within, or asks to end, says so if it can be resumed: by a file of what is done, `record`, beside
+    what is made.  What was kept and is damaged cannot.  Otherwise as `interruptible`."""
     from vid2ev.recording.destination import partial_of
 
-    before = which(directory)
+    def begun() -> bool:
+        return again and (partial_of(path) / record).exists()
+
+    try:
+        with interruptible(path, begun, again=again, others=others):
+            yield
+    except DataError as error:
+        resumable = begun() and not isinstance(error, SavedError)
+        raise DataError(f"{error}{f'; {KEPT}' * resumable}") from error
+
+
+@contextmanager
+def interruptible(path: Path, begun: Callable[[], bool], *, again: bool = True, others: bool = False) -> Iterator[None]:
+    """What asks to end within says what becomes of what is made at `path`; `again`: its source can be read again.
+    `others` that are done are kept, whatever becomes of this."""
+    before = _which(path)
     try:
         yield
-    except (DataError, KeyboardInterrupt) as error:
-        resumable = again and not isinstance(error, SavedError)
-        kept = resumable and (partial_of(directory) / "checkpoint.npz").exists()
-        if isinstance(error, DataError):
-            raise DataError(f"{error}{f'; {KEPT}' * kept}") from error
-        made = which(directory) != before  # (it was put in its place before that was heard)
-        say_interrupted(KEPT if kept or others or (made and again) else NOT_KEPT * (not made))
+    except KeyboardInterrupt:
+        made = _which(path) != before  # (it was put in its place before that was heard)
+        say_interrupted(KEPT if begun() or others or (made and again) else NOT_KEPT * (not made))
 
 
-def which(path: Path) -> int | None:
+def _which(path: Path) -> int | None:
     """What tells a file or a folder from another of its name; None if there is none."""
     with suppress(OSError):
         return path.stat().st_ino

@@ -55,9 +55,8 @@ def split_among(
     others: bool,
 ) -> dict[str, Any]:
     """Convert a video in parts, `others` perhaps being done already; returns the manifest."""
-    from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import bar, which
+    from vid2ev.commands.progress import bar, interruptible
     from vid2ev.interrupts import heard
     from vid2ev.making.split import begun_parts, convert_split, parts_of
     from vid2ev.terminal import counting
@@ -68,16 +67,12 @@ def split_among(
         if errors:
             raise errors[0]
 
-    before = which(directory)
-    try:
-        with heard() as check, ExitStack() as looking, bar(quiet, check) as report:
-            look = looking.enter_context(counting(quiet, LOOKS))
-            return convert_split(
-                video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
-            )
-    except KeyboardInterrupt:
-        kept = others or which(directory) != before or begun_parts(parts_of(directory))
-        say_interrupted(KEPT if kept else NOT_KEPT)
+    told = interruptible(directory, lambda: bool(begun_parts(parts_of(directory))), others=others)
+    with told, heard() as check, ExitStack() as looking, bar(quiet, check) as report:
+        look = looking.enter_context(counting(quiet, LOOKS))
+        return convert_split(
+            video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
+        )
 
 
 def checked_for(workers: Workers, video: str, directory: Path, split: Split | None, options: dict[str, Any]) -> None:
