@@ -283,6 +283,7 @@ def options_of(options: dict[str, Any]) -> dict[str, Any]:
             {"rig": Rig(cameras=rig().cameras[:2]), "cis": CisSpec()},
             "^cis: expected a frame camera in the rig; add --fr",
         ),
+        ({"rig": FRAMES, "sensor": "davis346"}, "^sensor 'davis346': expected an event camera in the rig; add one"),
         ({"truth_rate_hz": 7.0}, "^truth at 7 Hz: expected some to be written; add --truth"),
         ({"depth": "plane:2"}, "leave --depth out"),
         ({"rig": rig(translation_mm=(0.0, 0.0, 0.0)), "depth": "plane:2"}, "leave --depth out"),

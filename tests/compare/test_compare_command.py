@@ -90,6 +90,8 @@ def test_numbers_and_text_and_picture() -> None:
     compare(mine, theirs, "--plot", "new/picture.png", "--overwrite")
     with pytest.raises(UsageError, match=r"\.png"):
         CliRunner().invoke(command, [mine, theirs, "--plot", "picture.pdf"], catch_exceptions=False)
+    with pytest.raises(UsageError, match=rf"{mine}/new/picture.png cannot be written: .* is a file; choose another"):
+        CliRunner().invoke(command, [mine, theirs, "--plot", f"{mine}/new/picture.png"], catch_exceptions=False)
 
 
 def test_nothing_in_common_is_1_or_more_and_so_it_is_said() -> None:

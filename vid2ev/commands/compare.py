@@ -75,12 +75,13 @@ def _facts(name: str, compared: Compared) -> list[tuple[str, str]]:
 
 def _pictures(picture: Path | None, names: list[str], overwrite: bool) -> dict[str, Path]:
     """The picture of the only comparison, or those of each camera, with its name in theirs."""
+    from vid2ev.recording.destination import check_new
+
     if picture is None:
         return {}
     if picture.suffix.lower() != ".png":
         raise UsageError(f"--plot {picture}: expected a name that ends in .png")
     places = {name: picture.with_stem(f"{picture.stem}_{name}") if name else picture for name in names}
     for place in places.values():
-        if place.exists() and not overwrite:
-            raise UsageError(f"{place} exists; --overwrite replaces it")
+        check_new(place, overwrite)
     return places

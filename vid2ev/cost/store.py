@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import UsageError
+from vid2ev.recording.destination import check_new
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.sources import short_name
 
@@ -29,8 +29,7 @@ def check(name: str | None, source: str, overwrite: bool, kind: str = "cost") ->
     stem = name or f"{short_name(source)}_{kind}"
     places = Path(f"{stem}.json"), Path(f"{stem}.png")
     for place in places:
-        if place.exists() and not overwrite:
-            raise UsageError(f"{place} exists; --overwrite replaces it")
+        check_new(place, overwrite)
     return places
 
 

@@ -14,13 +14,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from vid2ev.gui.setup import PRESET, Setup, texts_of
+from vid2ev.gui.setup import Setup, texts_of
 from vid2ev.making.conversion import default_directory
+from vid2ev.recording.destination import check_new
 from vid2ev.recording.disk import sync, writing
 from vid2ev.rig.camera import Camera, Rig, default_rig
-from vid2ev.rig.rig_file import check_free, rig_text, write_text
+from vid2ev.rig.rig_file import rig_text, write_text
 from vid2ev.scenes.own_files import copy_files, named_from, with_own_files
-from vid2ev.sensors.presets import sensor_file_text
+from vid2ev.sensors.presets import PRESET, sensor_file_text
 from vid2ev.toml_text import toml_text
 
 RIG, SCENE = "rig.toml", "scene.toml"
@@ -103,7 +104,7 @@ def write_scene(setup: Setup, path: Path, overwrite: bool = False) -> None:
     tables, files = with_own_files(named_from(setup.settled().tables(), path.parent), _beside(path))
     with writing(path, "choose another place"):
         for place in (path, *(path.parent / name for name in files)):
-            check_free(place, overwrite)
+            check_new(place, overwrite)
         with TemporaryDirectory(dir=path.parent, prefix=f".{_beside(path)}.") as folder:
             made = Path(folder)
             copy_files(files, made)

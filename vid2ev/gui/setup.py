@@ -20,11 +20,9 @@ from vid2ev.rig.rig_file import made, read_rig
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.source import Request, parse_request, rig_of_scene
 from vid2ev.seen.recipe import refuse_recordings
-from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile
+from vid2ev.sensors.presets import CIS, DVS, PRESET, Kind, SensorFile
 from vid2ev.sources import SCENE_PREFIX, check_there, is_live, is_scene
 from vid2ev.toml_text import toml_value
-
-PRESET = "paper"  # of cameras that name no sensor
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ def check_destination(path: Path) -> None:
         raise UsageError(f"{path} cannot be renamed into place; give a folder within it, such as {path / 'events'}")
     if path.is_symlink():
         raise UsageError(f"{path} is a link, which would be replaced; give what it leads to, or another place")
+    _check_above(path)
 
 
 def check_folder(folder: Path) -> None:
@@ -31,6 +32,20 @@ def check_folder(folder: Path) -> None:
     check_destination(folder)
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{folder} is a file; choose a folder with -o")
+
+
+def check_new(path: Path, overwrite: bool) -> None:
+    """Raise UsageError where a file cannot be written, or would have to be replaced."""
+    if path.is_dir() or (path.exists() and not overwrite):
+        remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
+        raise UsageError(f"{path} exists; {remedy}")
+    _check_above(path)
+
+
+def _check_above(path: Path) -> None:
+    above = next(each for each in path.absolute().parents if os.path.exists(each))
+    if not os.path.isdir(above):
+        raise UsageError(f"{path} cannot be written: {above} is a file; choose another place")
 
 
 def check_apart(source: str | Path, output: Path) -> None:

@@ -24,6 +24,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from vid2ev.errors import DataError, UsageError, clause, nearest
+from vid2ev.recording.destination import check_new
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.toml_text import parsed_toml, toml_value
@@ -99,16 +100,9 @@ def write_text(path: Path, text: str, overwrite: bool = False) -> None:
     """A text file, as a whole or not at all.  Raises UsageError where one is in the way, DataError where the disk
     cannot take it."""
     with writing(path, "choose another place"):
-        check_free(path, overwrite)
+        check_new(path, overwrite)
         with whole_file(path) as file:
             file.write(text.encode())
-
-
-def check_free(path: Path, overwrite: bool) -> None:
-    """Raise UsageError where a file cannot be written, or would have to be replaced."""
-    if path.is_dir() or (path.exists() and not overwrite):
-        remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
-        raise UsageError(f"{path} exists; {remedy}")
 
 
 def read_text(path: Path) -> str:

@@ -60,9 +60,9 @@ class Pattern(Part):
 
     @model_validator(mode="after")
     def _fits(self) -> Pattern:
-        wanted = 3 if self.pattern == "sky" else 2
+        wanted, of = (3, ", below, at the horizon and above") if self.pattern == "sky" else (2, "")
         if len(self.colours) != wanted:
-            raise ValueError(f"pattern '{self.pattern}' takes {wanted} colours, not {len(self.colours)}")
+            raise ValueError(f"pattern '{self.pattern}' takes {wanted} colours{of}, not {len(self.colours)}")
         return self
 
 

@@ -16,7 +16,7 @@ from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.limits import check_sensor
-from vid2ev.sensors.presets import check_overrides, load_cis, load_sensor
+from vid2ev.sensors.presets import PRESET, check_overrides, load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.toml_text import toml_value
@@ -44,8 +44,8 @@ class Sensors:
     Raises UsageError for changes to a specification.
     """
 
-    dvs: str | Path | DvsSpec = "paper"
-    cis: str | Path | CisSpec = "paper"
+    dvs: str | Path | DvsSpec = PRESET
+    cis: str | Path | CisSpec = PRESET
     overrides: Sequence[str] = ()
 
     def __post_init__(self) -> None:
@@ -82,8 +82,8 @@ class Sensors:
                 raise type(error)(f"{file}: camera '{camera.name}': {error}") from error
             raise
 
-    def check_changes(self, cameras: Iterable[Camera]) -> None:
-        """Raise UsageError for changes to sensors of a kind that none of the cameras has."""
+    def check_cameras(self, cameras: Iterable[Camera], cis_asked: bool) -> None:
+        """Raise UsageError for sensors that are asked for, or changes, of a kind that none of the cameras has."""
         kinds = {camera.kind for camera in cameras}
         if "cis" not in kinds and (texts := self._changes("cis")):
             raise UsageError(f"setting '{texts[0]}': expected a frame camera to change; add --frames, or leave it out")
@@ -91,9 +91,19 @@ class Sensors:
             raise UsageError(
                 f"setting '{texts[0]}': expected an event camera to change; keys of frame sensors begin with cis."
             )
+        if "cis" not in kinds and cis_asked:
+            raise UsageError(
+                f"cis{_named(self.cis)}: expected a frame camera in the rig; add --frames, or leave it out"
+            )
+        if "dvs" not in kinds and self.dvs != PRESET:
+            raise UsageError(f"sensor{_named(self.dvs)}: expected an event camera in the rig; add one, or leave it out")
 
     def _changes(self, kind: str) -> list[str]:
         return [text for text in self.overrides if text.strip().startswith("cis.") == (kind == "cis")]
+
+
+def _named(sensor: str | Path | Spec) -> str:
+    return "" if isinstance(sensor, Spec) else f" '{sensor}'"
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ from vid2ev.seen.truth import USUAL_HZ, Wanted
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.limits import check_seed
+from vid2ev.sensors.presets import PRESET
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
 from vid2ev.sources.framing import framing_of
@@ -76,7 +77,7 @@ class Recipe:
     def of(
         cls,
         video: str | Path,
-        sensor: str | Path | DvsSpec = "paper",
+        sensor: str | Path | DvsSpec = PRESET,
         overrides: Sequence[str] = (),
         *,
         cis: str | Path | CisSpec | None = None,
@@ -110,11 +111,8 @@ class Recipe:
         asked = read_rig(rig) if isinstance(rig, str | Path) else rig or default_rig(frames=cis is not None)
         asked = asked.with_frames() if frame_camera else asked
         alone = rig is None and len(asked.cameras) == 1
-        chosen = Sensors(sensor, "paper" if cis is None else cis, overrides)
-        chosen.check_changes(asked.cameras)
-        if cis is not None and all(camera.kind == "dvs" for camera in asked.cameras):
-            named = "" if isinstance(cis, CisSpec) else f" '{cis}'"
-            raise UsageError(f"cis{named}: expected a frame camera in the rig; add --frames, or leave it out")
+        chosen = Sensors(sensor, PRESET if cis is None else cis, overrides)
+        chosen.check_cameras(asked.cameras, cis is not None)
         if not truth and truth_rate_hz != USUAL_HZ:
             raise UsageError(
                 f"truth at {truth_rate_hz:g} Hz: expected some to be written; add --truth, or leave it out"

@@ -25,6 +25,8 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.toml_text import parsed_toml, toml_text
 from vid2ev.untrusted import read_text
 
+PRESET = "paper"  # of cameras that name no sensor
+
 
 @dataclass(frozen=True)
 class Kind:

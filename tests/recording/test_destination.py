@@ -1,0 +1,31 @@
+"""What is checked of a place before anything is made for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from vid2ev import UsageError
+from vid2ev.recording.destination import check_destination, check_new
+
+
+@pytest.mark.parametrize("place", ["file/new", "file/new/newer"])
+def test_nothing_can_be_within_a_file(tmp_path: Path, place: str) -> None:
+    (tmp_path / "file").touch()
+    for check in (check_destination, lambda path: check_new(path, overwrite=True)):
+        with pytest.raises(UsageError, match=rf"{place} cannot be written: .*file is a file; choose another place"):
+            check(tmp_path / place)
+        check(tmp_path / "folder" / place)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_new_file_takes_the_place_of_a_file_if_asked_and_never_of_a_folder(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    check_new(file, overwrite=True)
+    with pytest.raises(UsageError, match="file exists; --overwrite replaces it"):
+        check_new(file, overwrite=False)
+    for overwrite in (True, False):
+        with pytest.raises(UsageError, match="exists; give a file's name"):
+            check_new(tmp_path, overwrite)
