@@ -31,7 +31,7 @@ from vid2ev.sensors.devices import CPU, Device
 
 AHEAD = 48  # clips that are made before they are drawn from
 KEPT = 48  # clips behind the window that a slower process may still look at
-VERSION = 9  # of what `made` makes: raise it when clips of a number change
+VERSION = 10  # of what `made` makes: raise it when clips of a number change
 
 Report = Callable[[int, int], object]  # clips made, of how many
 

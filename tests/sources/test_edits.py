@@ -6,6 +6,7 @@ import json
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -91,6 +92,26 @@ def test_only_what_is_needed_is_decoded(encode, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(footage, "_decoded", counted)
     assert len(list(source.frames())) == 7
     assert len(seen) <= 10 + 7 + 1
+
+
+def test_a_key_frame_that_the_decoder_guesses_is_none_to_begin_with(encode, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As those of 4:4:4 by x264 of before 2017, where its name at the beginning of the file is not read."""
+    path = encode("a.mp4", rising(200, (16, 16)), codec="libx264", options={"g": "10", "bf": "0"})
+    whole = [frame for frame in open_source(path).frames() if 5 * 10**9 <= frame.t_ns <= 5.2 * 10**9]
+    decoded = footage._decoded
+
+    def guessed(container, stream, planned, remarks):
+        for picture in decoded(container, stream, planned, remarks):
+            if planned:  # (from the beginning)
+                yield picture
+            else:
+                remarks.append("guessed")
+                yield SimpleNamespace(pts=picture.pts, time_base=picture.time_base, key_frame=True, is_corrupt=True)
+
+    source = open_source(path, start=5.0, stop=5.2)
+    monkeypatch.setattr(footage, "_decoded", guessed)
+    same(source.frames(), whole)
+    assert len(whole) == 7 and not source.warnings
 
 
 def test_parts_tile_the_whole(encode) -> None:

@@ -237,7 +237,11 @@ def reason(error: Exception) -> str:
 def _sought(
     container: Any, stream: Any, target_s: Fraction, since_s: Fraction, remarks: list[str]
 ) -> Iterator[Any] | None:
-    """The pictures from a key frame at or before `since_s` on; None if the file does not lead to one."""
+    """The pictures from a key frame at or before `since_s` on; None if the file does not lead to one that is whole.
+
+    (Without what is in front of the first picture, decoders guess at all of H.264 in 4:4:4 by x264 before its build
+    151: they have to know of its mistakes, and its name is there.)
+    """
     try:
         container.seek(int(target_s // Fraction(stream.time_base)), stream=stream, backward=True)
     except av.FFmpegError:
@@ -245,7 +249,7 @@ def _sought(
     coming = _decoded(container, stream, 0, remarks)
     first = next(coming, None)
     stamp = None if first is None else stamp_of(first)
-    if first is None or stamp is None or not first.key_frame or stamp > since_s:
+    if first is None or stamp is None or not first.key_frame or first.is_corrupt or stamp > since_s:
         return None
     return chain([first], coming)
 
