@@ -126,7 +126,7 @@ def guided(
     corner      row and column of the frames at which the pictures begin, where they and the flows are of a part
     """
     flows = flows_to(frame_0, frame_1, pictures, transfer, footprint) if flows is None else flows
-    warps = both_warped(frame_0, frame_1, flows, corner)
+    warps = both_warped(frame_0, frame_1, flows, corner, cubic=True)
     shown = shown_of(pictures, transfer)
     return Guided(shown, flows, warps, agreement(warps, shown, transfer, footprint), footprint)
 

@@ -206,10 +206,10 @@ def run(network: nn.Module, parts: Sequence[torch.Tensor]) -> torch.Tensor:
     return found.float().unflatten(0, joined.shape[:2])
 
 
-def warped(pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:
+def warped(pair: Pair, flows_at: torch.Tensor, *, cubic: bool = False) -> torch.Tensor:
     """Both frames, warped by flows [B, N, 4, H, W] to them: [B, N, 2, C, H, W]."""
     whole = pair.around or pair
-    return _carried((whole.frame_0, whole.frame_1), pair, flows_at)
+    return _carried((whole.frame_0, whole.frame_1), pair, flows_at, cubic)
 
 
 def sought(pair: Pair, transfer: Transfer) -> torch.Tensor:
@@ -224,10 +224,10 @@ def shares_at(times: torch.Tensor) -> torch.Tensor:
     return torch.stack([1 - times, times], -1)
 
 
-def _carried(frames: tuple[torch.Tensor, ...], pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:
+def _carried(frames: tuple[torch.Tensor, ...], pair: Pair, flows_at: torch.Tensor, cubic: bool = False) -> torch.Tensor:
     """Two whole frames, warped to a pair, or to the part of them that it is."""
     first, second = frames
-    return both_warped(first, second, flows_at, None if pair.around is None else pair.around.corner)
+    return both_warped(first, second, flows_at, None if pair.around is None else pair.around.corner, cubic=cubic)
 
 
 def _in_colours(made: Interpolated, pair: Pair, times: torch.Tensor, transfer: Transfer) -> Interpolated:

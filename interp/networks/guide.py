@@ -100,6 +100,6 @@ def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer, gate: torch.Te
     shown = shown_of(light, transfer)
     wrong, _ = off_by(shown, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer))
     near = gate[:, None]
-    carried = carried_off_by(agreement(warped(pair, flows), shown, transfer), wrong)
+    carried = carried_off_by(agreement(warped(pair, flows, cubic=True), shown, transfer), wrong)
     unsure = near * part_of(carried, wrong).detach()
     return Guide(transfer, light, shown, found, flows, by_themselves, wrong, near, unsure)

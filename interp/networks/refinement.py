@@ -38,17 +38,20 @@ def refined(
     flow_scale: float,
     first: torch.Tensor | None = None,
     unsure: torch.Tensor | float = 1.0,
+    *,
+    cubic: bool = False,
 ) -> Refined:
     """Refined flows at times [B, N], both frames warped by them, and what is visible.
 
     beside   what else the UNet takes, after its 8 channels of flows and four pictures
     first    flows at times to refine; those that the flows between the frames stand for unless given
     unsure   how much of what the UNet says counts, [B, N, 1, H, W], 0 ... 1
+    cubic    how frames are seen between their pixels (`warp.py`)
     """
     assert pair.flows is not None
     at = flows_at(pair.flows, times) if first is None else first
-    warps = warped(pair, at)
+    warps = warped(pair, at, cubic=cubic)
     parts = [pair.frame_0, pair.frame_1, pair.flows, at[:, :, 2:], at[:, :, :2], warps[:, :, 1], warps[:, :, 0]]
     found = unsure * run(unet, [*parts, *beside])
     at = at + found[:, :, :4] * flow_scale
-    return Refined(at, warped(pair, at), found[:, :, 4:], warps)
+    return Refined(at, warped(pair, at, cubic=cubic), found[:, :, 4:], warps)

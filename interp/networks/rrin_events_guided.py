@@ -86,7 +86,7 @@ class RrinEventsGuided(FrameFed):
         at = self.scale.down(guide.flows) / self.scale.factor
         correction = self.scale.down(guide.unsure) * run(self.refine, [at, *seen]) * self.spec.flow_scale
         flows = guide.flows + self.scale.flow_up(correction)
-        warps = warped(pair, flows)
+        warps = warped(pair, flows, cubic=True)
         logits = self._visible(guide.unsure, warps, [at + correction, *seen]) + guide.agreement(warps)
         warped_mix, weights = blend(warps, logits, shares_at(times))
         carried, agreed = guide.nearer(warped_mix)

@@ -140,8 +140,9 @@ class RrinSlomoEvents(FrameFed):
 
     def _guided(self, pair: Pair, times: torch.Tensor, guide: Guide, beside: list[torch.Tensor]) -> Interpolated:
         """Images at times [B, N], from the closed form on."""
+        beside, scale = [guide.light, *beside], self.spec.flow_scale
         at, warps, visible, _ = refined(
-            self.combined, pair, times, [guide.light, *beside], self.spec.flow_scale, guide.flows, guide.unsure
+            self.combined, pair, times, beside, scale, guide.flows, guide.unsure, cubic=True
         )
         warped_mix, weights = blend(warps, F.logsigmoid(visible) + guide.agreement(warps), shares_at(times))
         carried, agreed = guide.nearer(warped_mix)
