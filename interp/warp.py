@@ -61,7 +61,8 @@ def sample(images: torch.Tensor, places: torch.Tensor, cubic: bool = False) -> t
     larger = F.pad(images, margin, mode="replicate")
     below = places if places.ndim == 4 else places.transpose(1, 2).flatten(2, 3)  # the N pictures as one
     x, y = below.to(images.dtype).unbind(1)
-    found = (_cubic if cubic else _bilinear)(larger, x.clamp(0, width - 1), y.clamp(0, height - 1))
+    x, y = x.clamp(0, width - 1), y.clamp(0, height - 1)
+    found = _cubic(larger, x, y) if cubic else _looked_up(larger, x, y, "bilinear")
     return found if places.ndim == 4 else found.unflatten(2, places.shape[1:4:2]).transpose(1, 2)
 
 
@@ -97,10 +98,6 @@ def flows_at(flows: torch.Tensor, times: torch.Tensor) -> torch.Tensor:
     t = times[:, :, None, None, None]
     forth, back = flows[:, None, :2], flows[:, None, 2:]
     return torch.cat([-(1 - t) * t * forth + t**2 * back, (1 - t) ** 2 * forth - t * (1 - t) * back], dim=2)
-
-
-def _bilinear(pictures: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-    return _looked_up(pictures, x, y, "bilinear")
 
 
 def _cubic(pictures: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
