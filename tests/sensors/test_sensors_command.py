@@ -56,6 +56,19 @@ def test_units_are_given_apart() -> None:
     assert keys["cis"]["exposure_us"]["unit"] == "us" and keys["cis"]["noise_lsb"]["unit"] == "LSB"
 
 
+@pytest.mark.parametrize(("kind", "name"), ALL)
+def test_a_page_says_what_each_key_may_be(kind: Kind, name: str) -> None:
+    page, keys = " ".join(run(name).split()), json.loads(run(name, "--json"))[kind.table]
+    for key, said in kind.spec.model_json_schema()["properties"].items():
+        if "enum" in said:
+            assert keys[key]["choices"] == said["enum"]
+            assert f"one of {', '.join(map(json.dumps, said['enum']))}" in page
+        if "maximum" in said:
+            least = f"above {said['exclusiveMinimum']:g}" if "exclusiveMinimum" in said else f"from {said['minimum']:g}"
+            assert keys[key]["limits"] == f"{least}, at most {said['maximum']:g}"
+            assert keys[key]["limits"] in page
+
+
 def test_a_file_of_a_frame_sensor_is_explained_as_one(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("[cis]\n# measured\nexposure_us = 123\n")

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def sensors(name: str | None, as_json: bool) -> None:
     """List the sensor presets, or explain one.
 
-    NAME is a preset or a TOML file; its page shows each key with value, unit, meaning and source.  Event sensors (dvs)
-    and frame sensors (cis) have presets of their own; a name that both have gives two pages.
+    NAME is a preset or a TOML file; its page shows each key with value, unit, meaning, limits or choices, and source.
+    Event sensors (dvs) and frame sensors (cis) have presets of their own; a name that both have gives two pages.
     """
     from vid2ev.sensors.presets import KINDS, kinds_of, read_sensor
 
@@ -41,13 +41,16 @@ def sensors(name: str | None, as_json: bool) -> None:
 
 
 def _explained(name: str, kind: Kind) -> tuple[SensorFile, dict[str, dict[str, Any]]]:
-    """A sensor, and of each key value, unit, meaning and source: those that the sensor states, then the defaults."""
+    """A sensor, and of each key value, unit, meaning, limits or choices, and source: those that the sensor states, then
+    the defaults."""
+    from vid2ev.gui.controls import controls_of
     from vid2ev.sensors.presets import load, read_sensor
     from vid2ev.sensors.spec import DvsSpec
 
     sensor, spec, explained = read_sensor(name, kind), load(kind, name), {}
     values = spec.model_dump(mode="json")
     reached = spec.reached_spreads() if isinstance(spec, DvsSpec) else {}
+    controls = {control.key: control for control in controls_of(kind.spec)}
     for key in dict.fromkeys([*sensor.values, *kind.spec.model_fields]):
         meaning = kind.spec.model_fields[key].description or ""
         unit = re.search(r" \[(\w+)\]", meaning)
@@ -57,6 +60,10 @@ def _explained(name: str, kind: Kind) -> tuple[SensorFile, dict[str, dict[str, A
             "meaning": meaning.replace(unit[0], "") if unit else meaning,
             "source": sensor.sources.get(key) if key in sensor.values else "default",
         }
+        if controls[key].limits:
+            explained[key]["limits"] = controls[key].limits
+        if controls[key].choices:
+            explained[key]["choices"] = list(controls[key].choices)
         if key in reached:
             explained[key]["reached"] = list(reached[key])
     return sensor, explained
@@ -79,6 +86,10 @@ def _page(sensor: SensorFile, keys: dict[str, dict[str, Any]], kind: Kind) -> st
     for key, entry in keys.items():
         unit = f" {entry['unit']}" if entry["unit"] else ""
         lines += [f"{key} = {json.dumps(entry['value'])}{unit}", *_wrapped(entry["meaning"])]
+        if "limits" in entry:
+            lines += _wrapped(entry["limits"])
+        if "choices" in entry:
+            lines += _wrapped(f"one of {', '.join(map(json.dumps, entry['choices']))}")
         if "reached" in entry:
             on, off = entry["reached"]
             lines += _wrapped(f"reached: {on:.3g} nat ON, {off:.3g} nat OFF; no threshold is below a tenth of its mean")
