@@ -113,10 +113,10 @@ def test_the_last_override_wins_and_the_others_stay() -> None:
         ("threshold_on=1\nmismatch=2", ["threshold_on", "number"]),
         ("hot_probability=1.5", ["hot_probability = 1.5", "less than or equal to 1"]),
         ("filter=beside", ["filter = 'beside'", "'before' or 'after'"]),
-        ("random_phase=maybe", ["random_phase = 'maybe'", "it must be a valid boolean (default True)"]),
+        ("random_phase=maybe", ["random_phase = 'maybe'", "it must be a valid boolean (default true)"]),
         ("shading=[0, a]", ["shading"]),
-        ("shading=3", ["shading = 3", "it must be"]),
-        ("shading=[0, true]", ["shading = [0, true]", "a list of numbers"]),
+        ("shading=3", ["shading = 3", "it must be a list (default [])"]),
+        ("shading=[0, true]", ["shading = [0, true]", "a list of numbers (default [])"]),
         ("frame_rate_hz=-5", ["frame_rate_hz = -5", "greater than or equal to 0"]),
     ],
 )
@@ -167,6 +167,17 @@ def test_values_that_do_not_go_together_are_refused_in_one_sentence() -> None:
 def test_an_unknown_preset_is_refused_with_the_names_and_the_nearest() -> None:
     with pytest.raises(UsageError, match=r"davis364.*did you mean davis346\?.*ideal.*paper"):
         load_sensor("davis364")
+
+
+@pytest.mark.parametrize(("kind", "other", "option"), [(DVS, CIS, "--cis"), (CIS, DVS, "--sensor")])
+def test_a_file_of_the_other_kind_is_said_to_be_one(kind: Kind, other: Kind, option: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(f"[{other.table}]\n")
+    with pytest.raises(UsageError, match=rf"mine.toml is of another kind, \[{other.table}\]: .* {option}, "):
+        read_sensor(file, kind)
+    file.write_text("[dvs]\n[cis]\n")
+    with pytest.raises(UsageError, match=r"tables \[dvs\] and \[cis\]: expected one sensor; give each its own file"):
+        read_sensor(file, kind)
 
 
 @pytest.mark.parametrize("name", ["", "../paper", "paper.toml", "no/such.toml", "."])

@@ -20,7 +20,8 @@ What leaving a pole out changes: `photoreceptor_omission.py`.
 
 Sources: the cascade is the paper's "two-pole low pass filter"; weights by the variation of constants (any text on
 linear systems), checked against 60-digit arithmetic in the tests. `bandwidth = "light"` is v2e's intensity-dependent
-first pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark), dark = 20/255.
+first pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark), dark = 20/255; in an interval between
+two frames it is that of their mean light.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from vid2ev.requests import setting
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.record import first_said
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.toml_text import parsed_toml, toml_text
+from vid2ev.toml_text import parsed_toml, toml_text, toml_value
 from vid2ev.untrusted import read_text
 
 PRESET = "paper"  # of cameras that name no sensor
@@ -30,12 +30,14 @@ PRESET = "paper"  # of cameras that name no sensor
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of sensor: the table of its files, their specification, where its presets are, and a setting to show."""
+    """A kind of sensor: the table of its files, their specification, where its presets are, a setting to show, and the
+    option that takes one."""
 
     table: str
     spec: type[BaseModel]
     presets: Path
     example: str
+    option: str
 
     def names(self) -> list[str]:
         """The names of the presets that come with vid2ev, in alphabetical order."""
@@ -43,8 +45,8 @@ class Kind:
 
 
 HERE = Path(__file__).parent
-DVS = Kind("dvs", DvsSpec, HERE / "preset_files", "threshold_on=0.2")
-CIS = Kind("cis", CisSpec, HERE / "cis_files", "cis.exposure_us=500")
+DVS = Kind("dvs", DvsSpec, HERE / "preset_files", "threshold_on=0.2", "--sensor")
+CIS = Kind("cis", CisSpec, HERE / "cis_files", "cis.exposure_us=500", "--cis")
 KINDS = (DVS, CIS)
 
 
@@ -103,8 +105,8 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
         if truth and field is not None and _takes_numbers(field.annotation):  # (pydantic: 1 or 0)
             what = "list of numbers" if get_origin(field.annotation) is tuple else "number"
             raise UsageError(
-                f"{key} = {str(value).lower()} in sensor {sensor.name} is impossible: it must be a {what}"
-                f" (default {field.default!r})."
+                f"{key} = {toml_value(value)} in sensor {sensor.name} is impossible: it must be a {what}"
+                f" (default {_as_written(field.default)})."
             )
     try:
         return kind.spec(**values)
@@ -128,6 +130,14 @@ def read_sensor(name_or_path: str | Path, kind: Kind = DVS) -> SensorFile:
     name, path = _find(str(name_or_path), kind)
     text, tables = _tables(path)
     unknown = [key for key in tables if key not in (kind.table, "about")]
+    other = next((each for each in KINDS if each.table in unknown), None)
+    if other and kind.table in tables:
+        raise UsageError(f"Sensor file {path} has tables [dvs] and [cis]: expected one sensor; give each its own file.")
+    if other:
+        raise UsageError(
+            f"Sensor file {path} is of another kind, [{other.table}]: expected a table [{kind.table}]; such a sensor is"
+            f' given with {other.option}, or to a camera of kind "{other.table}" of a rig.'
+        )
     if unknown:
         raise UsageError(
             f"Sensor file {path} has '{unknown[0]}' outside its tables [{kind.table}] and [about]; "
@@ -215,9 +225,13 @@ def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
         other = next((each for each in KINDS if each is not kind and key in each.spec.model_fields), None)
         hint = f" (did you mean {other.table}.{key}?)" if other else nearest(key, kind.spec.model_fields)
         return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
-    default = kind.spec.model_fields[key].default
-    value = reprlib.repr(complaint["input"])
-    return f"{key} = {value} {where} is impossible: {first_said(error)} (default {default!r})."
+    default, value = _as_written(kind.spec.model_fields[key].default), reprlib.repr(complaint["input"])
+    return f"{key} = {value} {where} is impossible: {first_said(error)} (default {default})."
+
+
+def _as_written(default: Any) -> str:
+    """A default as it is in a file; of words with the quotes of sentences."""
+    return repr(default) if isinstance(default, str) else toml_value(default)
 
 
 def _list(names: Sequence[str]) -> str:
