@@ -182,6 +182,13 @@ def test_a_leak_that_goes_into_the_memories_wakes_who_sleeps():
     assert_same_state(skips, walks)
 
 
+def test_a_leak_wakes_who_sleeps_however_far_above_their_levels_are():
+    """A threshold of 100 nat is beyond what float32 has between light and level."""
+    spec = clean(threshold_on=100.0, leak_rate_hz=10, random_phase=False)
+    t_ns = np.array([0, 10, 20, 500, 600, 610, 2_000, 2_001, 2_400]) * 1_000_000
+    assert_alike(spec, np.full((len(t_ns), *SIZE[::-1]), 0.5, np.float32), t_ns)
+
+
 def test_light_of_another_type_is_other_light():
     light = np.full(SIZE[::-1], 0.5, np.float32)
     skips, walks = (Dvs(load_sensor("ideal"), SIZE, skip=skip, transfer="linear") for skip in (True, False))

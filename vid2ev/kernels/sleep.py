@@ -40,6 +40,7 @@ from vid2ev.kernels.crossing import least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
 from vid2ev.kernels.naps import AWAKE, LONGEST, NAPS, SLEEPS, borrow, catch_up
+from vid2ev.kernels.scan import HIGHEST
 from vid2ev.kernels.scratch import NEW, NOISE0
 from vid2ev.kernels.steep import STEEP
 from vid2ev.physics.elementary import exp64, log64
@@ -229,7 +230,8 @@ def is_quiet(block, scratch, i, lag, top, bottom, gain, flags, num, iv):
         scratch[ROOM + i] = (high - top) - NATS
         return bottom + F(iv.leak0) - NATS > low
     dark = F(num.curve.dark)
-    scratch[ROOM + i] = high / (top + dark)
+    # (what float32 has no number for would be no level, and yet thresholds of 90 nat are reached in time)
+    scratch[ROOM + i] = min(high / (top + dark), F(HIGHEST))
     return (bottom > -dark) & ((bottom + dark) * (gain - NATS * gain) > low)
 
 
