@@ -3,7 +3,8 @@
     theta' = theta + sigma z,   one draw per pixel, polarity and crossing; clipped like the mismatch
 
 The draw belongs to the pixel's crossing count, so the rate of events does not depend on how densely the light is
-sampled; jumps of the memory, by shot noise and after a blind time, count among the crossings. The memory becomes the level that was reached, noise included: that is where the signal stood.
+sampled; jumps of the memory, by shot noise and after a blind time, count among the crossings.  The memory becomes the
+level that was reached, noise included: that is where the signal stood.
 
 Source: the paper, section II.A: time-variant Gaussian noise, drawn "at each potentially crossed event threshold".
 """
