@@ -28,7 +28,7 @@ from numba import njit
 
 from vid2ev import UsageError
 from vid2ev.commands import main
-from vid2ev.commands.summary import file_facts, of_the_clip, result_facts, short
+from vid2ev.commands.summary import file_facts, of_the_clip, plan_text, result_facts, short
 from vid2ev.interrupts import heard, never_lost
 from vid2ev.making import conversion
 from vid2ev.recording.folder import Folder
@@ -802,3 +802,11 @@ def test_files_are_told_in_order_and_those_in_folders_are_all_counted(tmp_path: 
     assert file_facts(tmp_path) == [
         ("files", f"{tmp_path}: c.txt 2 B, z.txt 2 B, a/ 1 file, b/ 1 file, truth/ 3 files")
     ]
+
+
+def test_a_plan_without_a_bound_is_not_said_to_change_nothing() -> None:
+    rows = [{"effect": "shot", "fate": "dropped"}, {"effect": "leak", "fate": "kept"}]
+    assert plan_text({"rows": rows, "distance": None}) == "shot dropped; what that changes has no bound"
+    assert plan_text({"rows": rows, "max_lsb": None}) == "shot dropped; what that changes has no bound"
+    assert plan_text({"rows": rows, "distance": 0.014}) == "shot dropped; changes the distance by at most 0.014"
+    assert plan_text({"rows": rows, "max_lsb": 2.0}) == "shot dropped; changes levels by at most 2 LSB"

@@ -41,8 +41,8 @@ def plan_text(plan: Mapping[str, Any]) -> str:
     what, most, unit = (
         ("levels", plan["max_lsb"], " LSB") if "max_lsb" in plan else ("the distance", plan["distance"], "")
     )
-    bound = "no bound" if most is None else f"at most {most:.2g}{unit}"
-    return f"{gone}; changes {what} by {bound}"
+    changes = "what that changes has no bound" if most is None else f"changes {what} by at most {most:.2g}{unit}"
+    return f"{gone}; {changes}"
 
 
 def sensor_text(sensor: Mapping[str, Any]) -> str:
