@@ -19,7 +19,7 @@ import numpy as np
 
 
 class Label(IntEnum):
-    """Why an event was sent."""
+    """Why an event was sent; LEAK: ON, and the leak since the pixel's last crossing is half a threshold or more."""
 
     SIGNAL = 0
     SHOT = 1
