@@ -65,6 +65,23 @@ def test_variable_rate_and_reordered_frames(encode) -> None:
     assert brightness == sorted(brightness) and len(set(brightness)) == len(levels)
 
 
+def test_no_frame_of_h264_in_avi_is_lost_for_its_stamp(encode) -> None:
+    """AVI stamps packets in the order of decoding, so that those of B-frames run back in the order of presentation."""
+    options = {"bf": "16", "crf": "1", "x264-params": "b-adapt=0:scenecut=0"}
+    path = encode("a.avi", flat([5 * k + 10 for k in range(40)]), codec="libx264", options=options)
+    with av.open(str(path)) as container:
+        stamps = [picture.pts for picture in container.decode(video=0)]
+    assert stamps != sorted(stamps), "in order by themselves: the test tests nothing"
+    source = open_source(path)
+    frames = list(source.frames())
+    assert len(frames) == source.frames_expected == 40 and not source.warnings
+    steps_ns = np.diff([frame.t_ns for frame in frames])
+    assert steps_ns.min() == 33_333_333 and steps_ns.max() == 33_333_334
+    brightness = [frame.light.mean() for frame in frames]
+    assert brightness == sorted(brightness) and len(set(brightness)) == 40
+    assert [frame.t_ns for frame in source.frames(7)] == [frame.t_ns for frame in frames[7:]]
+
+
 def test_a_clip_that_starts_late_keeps_its_times(encode) -> None:
     hours = 3 * 3600 * 1000
     path = encode("a.mkv", flat([1, 2, 3]), stamps=[hours, hours + 33, hours + 66], time_base=Fraction(1, 1000))

@@ -18,6 +18,7 @@ import av
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.recognise import is_animated_png, recognise
+from vid2ev.sources.avi import stamps_in_order
 from vid2ev.sources.ffv1 import is_sound
 from vid2ev.sources.kept import Kept, Reader
 from vid2ev.sources.matroska import missing_bytes
@@ -256,6 +257,12 @@ def _sought(
 
 def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """Decoded pictures in order of presentation; what could not be read is told in `remarks` at the end."""
+    pictures = _of_packets(container, stream, planned, remarks)
+    return stamps_in_order(pictures) if stream.container.format.name == "avi" else pictures
+
+
+def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
+    """As `_decoded`, with the stamps that the decoder gives them."""
     whole = broken = guessed = sound = unsound = 0
     checked = stream.codec_context.name == "ffv1"
     for packet in _packets(container, stream, remarks):
