@@ -360,12 +360,22 @@ def test_a_truncated_file_gives_what_it_has_and_says_so(encode, name: str, codec
     assert len(list(source.frames(5))) == len(frames) - 5
 
 
-@pytest.mark.parametrize("name", ["a.mkv", "a.nut"])
-def test_a_whole_file_that_begins_late_is_not_truncated(encode, name: str) -> None:
-    path = encode(name, noisy(13), stamps=[90 + k for k in range(13)])
+@pytest.mark.parametrize(("name", "codec"), [
+    ("a.mkv", "ffv1"), ("a.nut", "ffv1"), ("a.flv", "flv"), ("a.wmv", "wmv2"),
+])  # fmt: skip
+def test_a_whole_file_that_begins_late_is_not_truncated(encode, name: str, codec: str) -> None:
+    stored = [*noisy(13)] if codec == "ffv1" else [chroma_too(code) for code in range(13)]
+    path = encode(name, stored, codec=codec, stamps=[90 + k for k in range(13)])
     source = open_source(path)
     assert len(list(source.frames())) == 13 and not source.warnings
     assert source.frames_expected in (12, 13)  # (NUT says when the last one begins)
+
+
+def test_flv_with_reordered_frames_is_not_truncated(encode) -> None:
+    """They begin late, by as many frames as are stored before their turn."""
+    source = open_source(encode("a.flv", noisy(13), codec="libx264", options={"bf": "3"}))
+    assert [next(source.frames()).t_ns > 0, len(list(source.frames())), source.warnings] == [True, 13, []]
+    assert source.frames_expected == 13
 
 
 @pytest.mark.parametrize("container_options", [{}, {"mpegts_m2ts_mode": "1"}], ids=["188", "192"])

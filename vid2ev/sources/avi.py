@@ -1,6 +1,6 @@
 """Times in AVI files, which have none of presentation: the stamp of a packet is its place, in the order of decoding.
 
-FFmpeg gives H.264 with B-frames, whose pictures come in order of presentation, the stamps of their packets, out of order.
+FFmpeg gives pictures of H.264 with B-frames, which come in order of presentation, the stamps of their packets.
 """
 
 from __future__ import annotations

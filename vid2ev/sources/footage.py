@@ -210,8 +210,8 @@ def announced_end_s(container: Any, stream: Any, begin_s: Fraction) -> Fraction 
     """Where a stream that begins at `begin_s` ends [s] by the header: its tag (Matroska), or the duration if the file
     holds nothing else.
 
-    Containers say how long it lasts, and so does Matroska as mkvmerge writes it; libavformat writes the end there, and
-    reads it so of NUT.
+    Containers say how long it lasts, and so does Matroska as mkvmerge writes it; libavformat writes the end there and
+    in FLV and ASF, and reads it so of NUT.
     """
     tag = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
     if tag:
@@ -221,8 +221,9 @@ def announced_end_s(container: Any, stream: Any, begin_s: Fraction) -> Fraction 
         said_s = Fraction(container.duration, 10**6)
     else:
         return None
-    of_lavf = "matroska" in container.format.name and _muxer(container).startswith("Lavf")
-    is_end = (of_lavf or container.format.name == "nut") and said_s > begin_s
+    kinds = set(container.format.name.split(","))
+    of_lavf = bool(kinds & {"matroska", "flv", "asf"}) and _muxer(container).startswith("Lavf")
+    is_end = (of_lavf or "nut" in kinds) and said_s > begin_s
     return said_s if is_end else begin_s + said_s
 
 
