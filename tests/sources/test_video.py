@@ -371,6 +371,17 @@ def test_a_whole_file_that_begins_late_is_not_truncated(encode, name: str, codec
     assert source.frames_expected in (12, 13)  # (NUT says when the last one begins)
 
 
+def test_avi_with_dropped_frames_is_not_truncated(encode) -> None:
+    """Their places are in the file, empty, and are counted by its header."""
+    stamps = [0, 1, 2, 5, 6, 30, 31, 39]
+    path = encode("a.avi", noisy(8), stamps=stamps)
+    source = open_source(path)
+    assert [round(frame.t_ns * 30e-9, 5) for frame in source.frames()] == stamps
+    assert not source.warnings and source.duration_expected_s == pytest.approx(40 / 30)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 6 // 10])
+    assert any("truncated" in warning for warning in list_warnings(path))
+
+
 def test_flv_with_reordered_frames_is_not_truncated(encode) -> None:
     """They begin late, by as many frames as are stored before their turn."""
     source = open_source(encode("a.flv", noisy(13), codec="libx264", options={"bf": "3"}))

@@ -264,9 +264,11 @@ def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> I
 
 def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """As `_decoded`, with the stamps that the decoder gives them."""
-    whole = broken = guessed = sound = unsound = 0
+    whole = broken = guessed = sound = unsound = places = 0
     checked = stream.codec_context.name == "ffv1"
     for packet in _packets(container, stream, remarks):
+        if stream.container.format.name == "avi" and packet.dts is not None:
+            places = packet.dts + 1  # (some are empty: frames that were dropped when it was recorded)
         if packet.is_corrupt:  # (cut off in the middle; the decoder would invent the rest)
             broken += 1
             continue
@@ -286,7 +288,7 @@ def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -
         remarks.append(f"damaged pictures, which the decoder has guessed with those that build on them: {guessed}")
     if broken:
         remarks.append(f"damaged packets of the file left out: {broken}")
-    if whole + broken < planned:
+    if max(whole + broken, places) < planned:
         remarks.append(f"truncated: the file holds {whole} of the {planned} frames it announces")
 
 
