@@ -403,6 +403,19 @@ def test_a_stream_that_ends_within_a_packet_says_that_it_is_truncated(encode, co
         assert [text for text in source.warnings if "truncated" in text] == [said] * bool(cut)
 
 
+def test_a_gif_that_is_cut_off_says_so(encode) -> None:
+    """FFmpeg gives what there is of the last picture, over the one before."""
+    stored = [chroma_too(code).reformat(format="rgb8") for code in range(0, 250, 25)]
+    path = encode("a.gif", stored, codec="gif")
+    whole = path.read_bytes()
+    for padding in (b"", bytes(512)):
+        path.write_bytes(whole + padding)
+        assert len(list(open_source(path).frames())) == 10 and not list_warnings(path)
+    for size in (len(whole) - 1, len(whole) * 6 // 10):
+        path.write_bytes(whole[:size])
+        assert any("truncated" in warning for warning in list_warnings(path))
+
+
 def test_a_file_without_its_index_is_refused(encode) -> None:
     path = encode("a.mp4", noisy(40), codec="libx264")
     path.write_bytes(path.read_bytes()[:-2000])

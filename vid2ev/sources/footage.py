@@ -19,10 +19,10 @@ import av
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.recognise import is_animated_png, recognise
 from vid2ev.sources.avi import stamps_in_order
+from vid2ev.sources.ends import TAIL, remarks_on_end
 from vid2ev.sources.ffv1 import is_sound
 from vid2ev.sources.kept import Kept, Reader
 from vid2ev.sources.matroska import missing_bytes
-from vid2ev.sources.transport_stream import TAIL, remarks_on_end
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
 STREAMS = "Y4M, Matroska, MPEG-TS or fragmented MP4"
