@@ -161,6 +161,30 @@ def test_tiff_by_another_writer(tmp_path: Path, dtype, shape: tuple[int, ...], c
     assert source.describe()["transfer"] == ("linear" if pixels.dtype.kind == "f" else "srgb")
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("big", [False, True], ids=["classic", "big"])
+@pytest.mark.parametrize("byteorder", "<>")
+def test_no_layout_of_a_tiff_is_read_for_another(tmp_path: Path, dtype: type, big: bool, byteorder: str) -> None:
+    """Planes apart, white as 0, transparency beside grey: either what is stored, or a sentence."""
+    path = tmp_path / "a.tif"
+    stored = codes((24, 16, 3), np.uint8 if dtype is np.float32 else dtype).astype(dtype)
+    grey, see_through = stored[..., 0], {"extrasamples": ["unassalpha"], "planarconfig": "contig"}
+    refused = 0
+    for written, meant, options in [
+        (stored, stored, {"photometric": "rgb"}),
+        (np.moveaxis(stored, -1, 0), stored, {"photometric": "rgb", "planarconfig": "separate"}),
+        (grey, np.iinfo(np.uint8).max - grey, {"photometric": "miniswhite"}),
+        (stored[..., :2], grey, {"photometric": "minisblack", **see_through}),
+    ]:
+        tifffile.imwrite(path, written, bigtiff=big, byteorder=byteorder, **options)
+        try:
+            assert np.array_equal(read_picture(path).pixels, meant)
+        except DataError as error:
+            refused += 1
+            assert dtype != np.uint8 and f"a TIFF of {dtype(0).nbytes * 8} bits" in str(error)
+    assert refused == (0 if dtype is np.uint8 else 3)
+
+
 def test_a_tiff_with_pages_is_a_clip(tmp_path: Path) -> None:
     stack = codes((5, 6, 8), np.uint16)
     path = tmp_path / "stack.tif"

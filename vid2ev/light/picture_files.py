@@ -24,6 +24,7 @@ from vid2ev.light.pictures import TYPES
 from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
 from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
+from vid2ev.light.tiff_tags import check_tiff
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr, plain_name
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
@@ -132,6 +133,8 @@ def _read(path: Path, page: int, count: int = 1) -> list[np.ndarray]:
     """Pictures from a page on, as many as there are up to `count`.  Raises DataError if there is none."""
     import cv2
 
+    if head_of(path).startswith(TIFF):
+        check_tiff(path)
     found = decoded(path, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page, count)
     if not found:
         raise DataError(f"{path}: not an image that can be read; remove it or write it anew")
