@@ -42,6 +42,7 @@ class Grid(Protocol):
 class NetCounts:
     """ON minus OFF events of a sensor of `size` (width, height) between each two of the ascending `edges_us`.
 
+    dtype      int8, in which counts stay within -128 ... 127 event by event, or int16
     polarity   count OFF and ON events apart, as [n, 2, height, width]
     """
 
