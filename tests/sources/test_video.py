@@ -403,6 +403,17 @@ def test_a_stream_that_ends_within_a_packet_says_that_it_is_truncated(encode, co
         assert [text for text in source.warnings if "truncated" in text] == [said] * bool(cut)
 
 
+@pytest.mark.parametrize(("name", "codec"), [("a.mkv", "ffv1"), ("a.ts", "libx264"), ("a.gif", "gif")])
+def test_a_file_that_is_moved_away_meanwhile_is_read_to_its_end(encode, name: str, codec: str) -> None:
+    stored = [chroma_too(code).reformat(format="rgb8") for code in range(9)] if codec == "gif" else [*noisy(9)]
+    path = encode(name, stored, codec=codec)
+    source = open_source(path)
+    coming = source.frames()
+    next(coming)
+    path.rename(path.with_suffix(".elsewhere"))
+    assert len(list(coming)) == 8 and not source.warnings
+
+
 def test_a_gif_that_is_cut_off_says_so(encode) -> None:
     """FFmpeg gives what there is of the last picture, over the one before."""
     stored = [chroma_too(code).reformat(format="rgb8") for code in range(0, 250, 25)]

@@ -29,8 +29,8 @@ def cut_packet(tail: bytes) -> tuple[int, int] | None:
 
 
 def remarks_on_end(container: str, tail: bytes) -> list[str]:
-    """That a file in a container of this name (FFmpeg's) was cut off, if that can be seen of its end."""
-    if container == "gif" and not tail.rstrip(b"\0").endswith(GIF_TRAILER):  # (what pads a file is zeros)
+    """That a file in a container of this name (FFmpeg's) was cut off, if that can be seen of its end; of none, nothing."""
+    if container == "gif" and tail and not tail.rstrip(b"\0").endswith(GIF_TRAILER):  # (what pads a file is zeros)
         return ["truncated: the file does not end as a GIF does, so its last picture may be one in part"]
     cut = cut_packet(tail) if container == "mpegts" else None
     return [f"truncated: the file has {cut[0]} of the {cut[1]} bytes of its last packet"] if cut else []

@@ -92,9 +92,13 @@ class VideoFile:
             remarks += remarks_on_end(container.format.name, self._tail())
 
     def _tail(self) -> bytes:
-        with open(self.path, "rb") as file:
-            file.seek(-min(TAIL, self.path.stat().st_size), os.SEEK_END)
-            return file.read()
+        """The last bytes of the file; none if it was moved away meanwhile, which costs no picture."""
+        try:
+            with open(self.path, "rb") as file:
+                file.seek(-min(TAIL, file.seek(0, os.SEEK_END)), os.SEEK_END)
+                return file.read()
+        except OSError:
+            return b""
 
     @contextmanager
     def _opened(self) -> Iterator[tuple[Any, Any]]:
