@@ -6,6 +6,7 @@ import math
 import operator
 import re
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any
 
 from vid2ev.errors import UsageError
@@ -28,6 +29,11 @@ def is_whole(number: Any, least: int, most: int | None = None) -> bool:
     except TypeError:
         return False
     return not isinstance(number, bool) and least <= whole and (most is None or whole <= most)
+
+
+def is_finite(number: Any) -> bool:
+    """Whether it is a number, and a finite one; texts, true and false are no numbers."""
+    return isinstance(number, Real) and not isinstance(number, bool) and math.isfinite(number)
 
 
 def names_in(texts: str | Sequence[str]) -> tuple[str, ...]:

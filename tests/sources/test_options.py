@@ -11,8 +11,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from vid2ev.commands import main
+from vid2ev.errors import UsageError
 from vid2ev.seen.instants import events_of
 from vid2ev.seen.recipe import Recipe
+from vid2ev.sources import open_source
 
 CLIP = "synthetic:moving-edge,size=40x30,duration_s=0.2,fps=100"
 
@@ -25,6 +27,15 @@ def converted(folder: Path, *arguments: str) -> dict:
     done = run("convert", *arguments, "-o", str(folder / "out"), "--sensor", "ideal", "--no-preview", "--threads", "1")
     assert done.exit_code == 0, done.output
     return json.loads((folder / "out" / "manifest.json").read_text())
+
+
+@pytest.mark.parametrize("source", [CLIP, "scene:room,size=8x6"])
+@pytest.mark.parametrize("option", ["fps", "slowdown", "start", "stop"])
+@pytest.mark.parametrize("value", ["25", "30000/1001", True, [1], b"1"])
+def test_what_is_no_number_is_refused_from_python(source: str, option: str, value: object) -> None:
+    """A text, too: whether it is one of a command line, and in what notation, nobody says."""
+    with pytest.raises(UsageError, match=rf"^{option} .*: expected a number"):
+        open_source(source, **{option: value})
 
 
 def test_edits_reach_the_recording_and_its_manifest(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources.source import LARGEST, Source, begins_s
+from vid2ev.sources.times import parse_fps
 from vid2ev.stream.frames import Colour
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ def open_source(
     """
     if colour not in ("luminance", "rgb"):
         raise UsageError(f"colour '{colour}': expected luminance or rgb")
+    if fps is not None:
+        fps = parse_fps(fps)
     if motion is None:
         source = _opened(str(path), transfer, fps, colour)
     else:

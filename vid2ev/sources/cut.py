@@ -16,6 +16,7 @@ from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.requests import is_finite
 from vid2ev.sources.edit import Edit
 from vid2ev.sources.times import LONGEST_NS, round_ns
 from vid2ev.stream.frames import Frame
@@ -152,7 +153,7 @@ class Slowed(Edit):
 
 def slowdown_of(slowdown: float | Fraction) -> float | Fraction:
     """The same.  Raises UsageError for one that is not from 1e-6 to 1000."""
-    if not math.isfinite(slowdown) or not FASTEST <= slowdown <= SLOWEST:
+    if not is_finite(slowdown) or not FASTEST <= slowdown <= SLOWEST:
         raise UsageError(
             f"slowdown {slowdown}: expected a number from 1e-6 to 1000, such as 8 for 240 fps that play at 30"
         )
@@ -162,8 +163,8 @@ def slowdown_of(slowdown: float | Fraction) -> float | Fraction:
 def _instant(seconds: float | Fraction | None, name: str) -> Fraction | None:
     if seconds is None:
         return None
-    if not math.isfinite(seconds) or abs(float(seconds)) * 1e9 > LONGEST_NS:
-        raise UsageError(f"{name} {seconds}: expected seconds on the source's clock")
+    if not is_finite(seconds) or abs(float(seconds)) * 1e9 > LONGEST_NS:
+        raise UsageError(f"{name} {seconds}: expected a number of seconds on the source's clock")
     return Fraction(str(seconds))
 
 

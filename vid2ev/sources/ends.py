@@ -29,7 +29,7 @@ def cut_packet(tail: bytes) -> tuple[int, int] | None:
 
 
 def remarks_on_end(container: str, tail: bytes) -> list[str]:
-    """That a file in a container of this name (FFmpeg's) was cut off, if that can be seen of its end; of none, nothing."""
+    """That a file in a container of this name (FFmpeg's) was cut off, if that can be seen of its end."""
     if container == "gif" and tail and not tail.rstrip(b"\0").endswith(GIF_TRAILER):  # (what pads a file is zeros)
         return ["truncated: the file does not end as a GIF does, so its last picture may be one in part"]
     cut = cut_packet(tail) if container == "mpegts" else None

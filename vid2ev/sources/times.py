@@ -18,7 +18,6 @@ opens and closes, and the first column counts.  The unit is
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
@@ -29,6 +28,7 @@ from typing import TypeVar
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.requests import is_finite
 from vid2ev.untrusted import check_file, first_line, read_array, read_lines
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
@@ -48,8 +48,8 @@ def round_ns(seconds: Fraction) -> int:
 
 def parse_fps(fps: float | Fraction) -> Fraction:
     """Frames per second as written: 29.97 is 2997/100, Fraction(30000, 1001) stays.  Raises UsageError."""
-    if not math.isfinite(fps) or not SLOWEST_HZ <= fps <= 10**9:
-        raise UsageError(f"fps {float(fps):g}: expected frames per second from {SLOWEST_HZ:g} to 1e9")
+    if not is_finite(fps) or not SLOWEST_HZ <= fps <= 10**9:
+        raise UsageError(f"fps {fps}: expected a number of frames per second from {SLOWEST_HZ:g} to 1e9")
     return Fraction(str(fps))
 
 
