@@ -93,6 +93,12 @@ def test_other_arrays_are_refused(tmp_path: Path, array: np.ndarray) -> None:
         open_source(saved(tmp_path, array), fps=1)
 
 
+@pytest.mark.parametrize("shape", [(0, 5, 6), (3, 0, 6), (3, 5, 6, 1), (5, 6)])
+def test_what_is_wrong_with_a_shape_is_said(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    with pytest.raises(DataError, match=r"expected \[N, H, W\] or \[N, H, W, 3\], each at least 1; bring"):
+        open_source(saved(tmp_path, np.zeros(shape, np.float32)), fps=30)
+
+
 @pytest.mark.parametrize("shape", [(2, 1, 65536), (2, 65536, 1)], ids=str)
 def test_pictures_larger_than_any_lens_is_described_for_are_refused(tmp_path: Path, shape: tuple[int, ...]) -> None:
     np.save(tmp_path / "wide.npy", np.ones(shape, np.float32))

@@ -56,7 +56,10 @@ class ArrayStack:
         self._stack = stack = NpyStack(self.path) if stack is None else stack
         shape, dtype = stack.shape, stack.dtype
         if len(shape) not in (3, 4) or min(shape) < 1 or (len(shape) == 4 and shape[3] != 3):
-            raise DataError(f"{self.path}: array of shape {shape}, expected [N, H, W] or [N, H, W, 3]")
+            raise DataError(
+                f"{self.path}: array of shape {shape}, expected [N, H, W] or [N, H, W, 3], each at least 1; bring it"
+                " into that shape"
+            )
         if dtype.newbyteorder("=") not in (np.uint8, np.uint16) and dtype.kind != "f":
             raise DataError(f"{self.path}: array of type {dtype}, expected {TYPES}")
         if transfer == "auto" and dtype.kind != "f":
