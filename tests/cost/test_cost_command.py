@@ -17,7 +17,7 @@ from moving_texture import texture
 from vid2ev.commands import Commands, splitting
 from vid2ev.commands.convert import convert
 from vid2ev.commands.cost import cost
-from vid2ev.cost import choice
+from vid2ev.cost import choice, store
 
 COMMON = ["--sensor", "ideal", "--fps", "50", "--threads", "1"]
 
@@ -63,7 +63,8 @@ def test_table_file_and_picture(clip: str) -> None:
     assert "upsample" not in json.dumps(json.loads(again.stdout)["settings"])
 
 
-def test_what_was_measured_is_said_also_where_it_cannot_be_written(clip: str) -> None:
+def test_what_was_measured_is_said_also_where_it_cannot_be_written(clip: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "check_new", lambda place, overwrite: None)  # (the place is taken after this)
     Path("taken").write_text("a file")
     done = call(cost, clip, *COMMON, "--repeats", "1", "--upsample", "none", "-o", "taken/cost")
     assert done.exit_code == 1 and "straight light" not in done.output

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
-from vid2ev import UsageError
+from vid2ev import DataError, UsageError
 from vid2ev.recording.destination import check_destination, check_new
 
 
@@ -29,3 +30,18 @@ def test_a_new_file_takes_the_place_of_a_file_if_asked_and_never_of_a_folder(tmp
     for overwrite in (True, False):
         with pytest.raises(UsageError, match="exists; give a file's name"):
             check_new(tmp_path, overwrite)
+
+
+def test_a_folder_that_may_not_be_written_to_is_known_before_anything_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closed, file = tmp_path / "closed", tmp_path / "closed" / "file"
+    closed.mkdir()
+    file.touch()
+    closed.chmod(0o555)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).stat().st_mode & 0o200)  # (root may write anywhere)
+    for place in (file, closed / "new", closed / "folder" / "new"):
+        with pytest.raises(DataError, match=rf"{place.name} cannot be written: .*closed may not be written to; choose"):
+            check_new(place, overwrite=True)
+    closed.chmod(0o755)
+    check_new(file, overwrite=True)

@@ -35,17 +35,20 @@ def check_folder(folder: Path) -> None:
 
 
 def check_new(path: Path, overwrite: bool) -> None:
-    """Raise UsageError where a file cannot be written, or would have to be replaced."""
+    """Raise UsageError where a file cannot be written, or would have to be replaced, DataError in folders of others."""
     if path.is_dir() or (path.exists() and not overwrite):
         remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
         raise UsageError(f"{path} exists; {remedy}")
-    _check_above(path)
+    above = _check_above(path)
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise DataError(f"{path} cannot be written: {above} may not be written to; choose another place")
 
 
-def _check_above(path: Path) -> None:
+def _check_above(path: Path) -> Path:
     above = next(each for each in path.absolute().parents if os.path.exists(each))
     if not os.path.isdir(above):
         raise UsageError(f"{path} cannot be written: {above} is a file; choose another place")
+    return above
 
 
 def check_apart(source: str | Path, output: Path) -> None:
