@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from vid2ev.terminal import counted
+
 NAMED = 3  # sequences that are named where many have the same to be said of them
 
 
 def left_out(summary: Mapping[str, Any]) -> dict[str, int]:
-    """What was not scored: reason, with its sequences where there are others, and number."""
+    """What was not scored: reason, which begins with "gaps" or "frames", with its sequences where there are others, and
+    number."""
     found: dict[str, dict[str, int]] = {}
     for name, of in summary["sequences"].items():
         counts = {f"gaps: {reason}": count for reason, count in of["not_scored"].items()}
@@ -43,7 +46,8 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
 
 def notes(summary: Mapping[str, Any]) -> list[str]:
     """All of it, a sentence each."""
-    return [*remarks(summary), *(f"not scored: {count} {reason}" for reason, count in left_out(summary).items())]
+    parts = [(count, *reason.split("s", 1)) for reason, count in left_out(summary).items()]
+    return [*remarks(summary), *(f"not scored: {counted(count, thing)}{why}" for count, thing, why in parts)]
 
 
 def several(names: Iterable[str]) -> str:
@@ -67,4 +71,4 @@ def _decoded_otherwise(summary: Mapping[str, Any]) -> Iterator[str]:
 def _perfect(methods: Mapping[str, Any]) -> Iterator[str]:
     for name, of in methods.items():
         if of["perfect"]:
-            yield f"{name}: {of['perfect']} frames without an error, or hardly any, count as 100 dB each"
+            yield f"{name}: {counted(of['perfect'], 'frame')} without an error, or hardly any, taken as 100 dB each"

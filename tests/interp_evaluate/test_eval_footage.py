@@ -88,6 +88,7 @@ def test_sequences_without_a_rate_and_pictures_of_another_size_do_not_end_the_re
     assert {name: about["groups"] for name, about in of.items()} == {"one": 0, "seq": 1, "still": 0, "two": 1}
     assert of["still"]["not_scored"] == {"times of the frames do not increase": 1}
     assert left_out(found.summary)["gaps: times of the frames do not increase, in still"] == 1
+    assert "not scored: 1 gap: times of the frames do not increase, in still" in notes(found.summary)
     assert [(*of["two"]["not_scored"],)[0].split(";")[0]] == [
         f"{picture}: 16x12 pixels, expected 40x24 as the first picture has"
     ]
@@ -636,6 +637,7 @@ def test_predictions_are_found_by_what_sequences_are_called_on_disk(tmp_path: Pa
     options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
     found = evaluate([str(tmp_path / "my seq (1)")], tmp_path / "report", **options)
     assert found.summary["methods"]["theirs"]["perfect"] == 3 and not found.summary["unusable"]
+    assert "theirs: 3 frames without an error, or hardly any, taken as 100 dB each" in notes(found.summary)
 
 
 def test_predictions_are_found_below_their_data_set(tmp_path: Path) -> None:
