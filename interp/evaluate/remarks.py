@@ -46,8 +46,8 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
 
 def notes(summary: Mapping[str, Any]) -> list[str]:
     """All of it, a sentence each."""
-    parts = [(count, *reason.split("s", 1)) for reason, count in left_out(summary).items()]
-    return [*remarks(summary), *(f"not scored: {counted(count, thing)}{why}" for count, thing, why in parts)]
+    parts = [(count, reason.partition("s")) for reason, count in left_out(summary).items()]
+    return [*remarks(summary), *(f"not scored: {counted(count, thing)}{why}" for count, (thing, _, why) in parts)]
 
 
 def several(names: Iterable[str]) -> str:

@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 from small_run import Made, clips
 
 from interp.commands.train import train
+from interp.data.sensor_ranges import SensorRanges
 from interp.networks import names
 from interp.train import runs
 from interp.train.batches import Feed
@@ -228,6 +229,26 @@ def test_settings_that_no_clip_can_have_are_refused_before_training(setting: str
     shown = run("--dry-run", "--set", setting)
     assert shown.exit_code == 2 and sentence in shown.output, shown.output
     assert shown.output.startswith("error: ") and shown.output.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("clips.sensors={exposed=0.3, threshold=[0.2,0.3]}",),
+        ("clips.sensors.exposed=0.3", "clips.sensors.threshold=[0.2,0.3]"),
+        ("clips.sensors={exposed=0.3}", "clips.sensors.threshold=[0.2,0.3]"),
+    ],
+)
+def test_ranges_of_sensors_are_set_one_by_one_or_together(settings: tuple[str, ...]) -> None:
+    found = Job.of(settings=settings).clips.sensors
+    assert found == SensorRanges(exposed=0.3, threshold=(0.2, 0.3))
+
+
+@pytest.mark.parametrize("setting", ["clips.sensors.exposd=0.3", "clips.sensors={exposd=0.3}"])
+def test_a_range_that_no_sensor_has_is_answered_with_those_that_it_has(setting: str) -> None:
+    shown = run("--dry-run", "--set", setting)
+    assert shown.exit_code == 2
+    assert "'clips.sensors.exposd' is unknown (did you mean exposed?); expected one of kinds, thres" in shown.output
 
 
 def test_shares_of_what_is_still_are_1_together_at_most() -> None:
