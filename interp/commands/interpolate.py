@@ -66,7 +66,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture, and of events of as many pixels.")
 @click.option("--size", metavar="W|WxH|WxH!", help="Pixels to bring a video to.")
 @click.option("--transfer", default="auto", show_default=True, metavar="CURVE", help="Of a video's codes.")
-@click.option("--source-fps", metavar="RATE", help="Of images without times.")
+@click.option("--source-fps", metavar="RATE", help="Of images or a video, instead of their own times.")
 @event_options(contrast="else what fits the frames")
 @click.option(
     "--tile", default="auto", show_default=True, metavar="WxH|auto|none",

@@ -130,7 +130,7 @@ class Options:
 
     start_s, stop_s   the part to take: on a video's own clock, of a recording after its first frame [s]
     crop, size, transfer   of videos and images, as `vid2ev.open_source` takes them
-    source_hz   frames per second, where the source has no times
+    source_hz   frames per second, instead of the source's own times
     contrast    what an OFF and an ON event stand for [nat], in place of what the recording says
     refractory_us   how long a pixel is blind after an event, likewise; 0 for not at all
     events      file of the events, where the frames are in another one

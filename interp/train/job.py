@@ -178,7 +178,12 @@ def _by_part(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
             )
         if part != "network" and _has_truth(value):  # (pydantic: 1 or 0)
             raise UsageError(f"setting {text} is impossible: true and false are no numbers")
-        parts[part if dot else "recipe"][rest if dot else key] = value
+        *above, last = (rest if dot else key).split(".")
+        values = parts[part if dot else "recipe"]
+        for name in above:  # (clips.sensors.threshold: of a record within)
+            within = values.get(name)
+            values[name] = values = dict(within) if isinstance(within, dict) else {}
+        values[last] = value
     return parts
 
 
@@ -198,10 +203,11 @@ def _valid(model: type[Any], values: dict[str, Any], prefix: str) -> Any:
             raise UsageError(f"settings of {prefix.rstrip('.') or 'the recipe'}: {clause(complaint['msg'])}") from error
         key = ".".join(map(str, complaint["loc"]))
         if complaint["type"] == "extra_forbidden":
-            hint = nearest(key, model.model_fields)
-            raise UsageError(
-                f"setting '{prefix}{key}' is unknown{hint}; expected one of {', '.join(model.model_fields)}"
-            ) from error
+            *above, last = map(str, complaint["loc"])
+            for name in above:
+                model, prefix = model.model_fields[name].annotation, f"{prefix}{name}."
+            hint, known = nearest(last, model.model_fields), ", ".join(model.model_fields)
+            raise UsageError(f"setting '{prefix}{last}' is unknown{hint}; expected one of {known}") from error
         raise UsageError(
             f"setting {prefix}{key} = {complaint['input']!r} is impossible: {reason_of(complaint)}"
         ) from error
