@@ -24,7 +24,8 @@ class Row:
                              differ visibly and the flow leads there and back; 0 where they do not differ, NaN where
                              it does so for less than a quarter of that: too far, flicker, or noise [px]
     motion_px_per_s          the same per second
-    events_per_px            events of the gap, with what their dead time hid, per pixel of the event camera
+    events_per_px            events of the gap, with what their dead time hid, per pixel of the event camera; of one
+                             that stands apart, as they were brought to the frames, by up to a few percent others
     contrast                 standard deviation of the truth's log light [nat]
     blur_px                  motion during an exposure of a key frame [px]
     disparity_px             mean disparity between frame and event camera [px of the frames]
