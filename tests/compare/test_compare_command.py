@@ -90,7 +90,7 @@ def test_numbers_and_text_and_picture() -> None:
     compare(mine, theirs, "--plot", "new/picture.png", "--overwrite")
     with pytest.raises(UsageError, match=r"\.png"):
         CliRunner().invoke(command, [mine, theirs, "--plot", "picture.pdf"], catch_exceptions=False)
-    with pytest.raises(UsageError, match=rf"{mine}/new/picture.png cannot be written: .* is a file; choose another"):
+    with pytest.raises(DataError, match=rf"{mine}/new/picture.png cannot be written: .* is a file; choose another"):
         CliRunner().invoke(command, [mine, theirs, "--plot", f"{mine}/new/picture.png"], catch_exceptions=False)
 
 

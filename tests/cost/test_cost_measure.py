@@ -125,7 +125,10 @@ def test_frames_are_compared_in_codes_of_the_same_camera(clip: str) -> None:
 def test_frame_cameras_alone_are_judged_in_codes(clip: str, tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "cis"\n')
     found = measured(
-        clip, clock=ticks(), rig=tmp_path / "rig.toml", **SIMPLE | {"upsample": "none", "given": ("upsample",)}
+        clip,
+        clock=ticks(),
+        rig=tmp_path / "rig.toml",
+        **SIMPLE | {"sensor": "paper", "upsample": "none", "given": ("upsample",)},
     )
     assert found.budget.text == "lsb=1" and found.recommended in (found.reference, found.rows[0])
     assert all(row.errors.distance is None and row.errors.rms_lsb is not None for row in found.rows)

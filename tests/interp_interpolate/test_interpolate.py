@@ -652,7 +652,7 @@ def test_images_without_times_are_told_the_option_that_gives_them(tmp_path: Path
     (folder / "timestamps.txt").unlink()
     with pytest.raises(UsageError, match="give --source-fps, or"):
         interpolate(folder, tmp_path / "out", method="linear")
-    with pytest.raises(UsageError, match=r"^--source-fps 0: expected frames per second"):
+    with pytest.raises(UsageError, match=r"^--source-fps 0: expected a number of frames per second"):
         interpolate(folder, tmp_path / "out", method="linear", options=Options(source_hz=Fraction(0)))
     options = Options(source_hz=Fraction(25))
     assert interpolate(folder, tmp_path / "out", method="linear", multiple=2, options=options)["frames"] == 3

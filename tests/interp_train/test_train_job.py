@@ -52,7 +52,7 @@ def test_settings_reach_what_they_are_of() -> None:
         ("rrin", ["net.bins=1"], r"setting 'net.bins=1': 'net' has no settings \(did you mean network\?\)"),
         ("rrin", ["network.bin=1"], r"rrin has no option 'bin' \(did you mean bins\?\)"),
         ("rrin", ["clips.multiples=[5]"], r"settings of clips: multiples \(5,\): expected some of 4, 8, 16, 32"),
-        ("rrin", ["clips.sensors.threshold=1"], r"setting 'clips.sensors.threshold' is unknown"),
+        ("rrin", ["clips.sensors.threshold=1"], r"clips.sensors.threshold = 1 is impossible: it must be a list"),
         ("rrin", ["samples.size=3"], r"setting samples.size = 3 is impossible: it must be greater than or equal to 16"),
         ("rrin", ["window.begin=0"], r"setting window.begin = 0 is impossible"),
         ("rrin", ["window.fresh=inf"], r"setting window.fresh = inf is impossible"),

@@ -15,7 +15,7 @@ from vid2ev.recording.destination import check_destination, check_new
 def test_nothing_can_be_within_a_file(tmp_path: Path, place: str) -> None:
     (tmp_path / "file").touch()
     for check in (check_destination, lambda path: check_new(path, overwrite=True)):
-        with pytest.raises(UsageError, match=rf"{place} cannot be written: .*file is a file; choose another place"):
+        with pytest.raises(DataError, match=rf"{place} cannot be written: .*file is a file; choose another place"):
             check(tmp_path / place)
         check(tmp_path / "folder" / place)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -16,8 +16,8 @@ def partial_of(path: Path) -> Path:
 
 
 def check_destination(path: Path) -> None:
-    """Raise UsageError for a link and for a place that nothing can be renamed to, DataError for a name that no file can
-    have; touches nothing."""
+    """Raise UsageError for a link and for a place that nothing can be renamed to, DataError within a file and for a
+    name that no file can have; touches nothing."""
     if not possible(str(path)):
         raise DataError(f"{str(path)[:80]!r}: File name too long; give one that a folder can have with -o")
     if path.name in ("", "..") or path.is_mount() or os.path.realpath(path) == os.getcwd():
@@ -35,7 +35,7 @@ def check_folder(folder: Path) -> None:
 
 
 def check_new(path: Path, overwrite: bool) -> None:
-    """Raise UsageError where a file cannot be written, or would have to be replaced, DataError in folders of others."""
+    """Raise UsageError where a file would have to be replaced, DataError where it cannot be written."""
     if path.is_dir() or (path.exists() and not overwrite):
         remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
         raise UsageError(f"{path} exists; {remedy}")
@@ -47,7 +47,7 @@ def check_new(path: Path, overwrite: bool) -> None:
 def _check_above(path: Path) -> Path:
     above = next(each for each in path.absolute().parents if os.path.exists(each))
     if not os.path.isdir(above):
-        raise UsageError(f"{path} cannot be written: {above} is a file; choose another place")
+        raise DataError(f"{path} cannot be written: {above} is a file; choose another place")
     return above
 
 
