@@ -263,7 +263,8 @@ def _sought(
 def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """Decoded pictures in order of presentation; what could not be read is told in `remarks` at the end."""
     pictures = _of_packets(container, stream, planned, remarks)
-    return stamps_in_order(pictures) if stream.container.format.name == "avi" else pictures
+    in_order = stream.container.format.name != "avi" or stream.codec_context.codec.intra_only
+    return pictures if in_order else stamps_in_order(pictures)
 
 
 def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
