@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,8 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+
+from vid2ev.sources import footage
 
 Encode = Callable[..., Path]
 
@@ -80,3 +82,21 @@ def shared_videos() -> Path:
 def make_picture() -> Callable[..., av.VideoFrame]:
     """`picture`, for tests that give planes."""
     return picture
+
+
+@pytest.fixture
+def stamps_passing(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[int]]:
+    """stamps_passing(name) -> the stamps of the pictures that a function of `footage` has given, as they come."""
+
+    def passing(name: str) -> list[int]:
+        given, seen = getattr(footage, name), list[int]()
+
+        def counted(*arguments: Any) -> Iterator[Any]:
+            for picture in given(*arguments):
+                seen.append(picture.pts)
+                yield picture
+
+        monkeypatch.setattr(footage, name, counted)
+        return seen
+
+    return passing

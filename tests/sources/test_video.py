@@ -82,20 +82,11 @@ def test_no_frame_of_h264_in_avi_is_lost_for_its_stamp(encode) -> None:
     assert [frame.t_ns for frame in source.frames(7)] == [frame.t_ns for frame in frames[7:]]
 
 
-def test_pictures_that_stand_alone_do_not_wait_for_others_in_avi(
-    encode, make_picture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pictures_that_stand_alone_do_not_wait_for_others_in_avi(encode, make_picture, stamps_passing) -> None:
     grey = [np.full((side, side), 128, np.uint8) for side in (16, 8, 8)]
     stills = [make_picture(grey, "yuvj420p") for _ in range(25)]
     source = open_source(encode("a.avi", stills, codec="mjpeg"))
-    of_packets, seen = footage._of_packets, []
-
-    def counted(*arguments):
-        for each in of_packets(*arguments):
-            seen.append(each.pts)
-            yield each
-
-    monkeypatch.setattr(footage, "_of_packets", counted)
+    seen = stamps_passing("_of_packets")
     next(source.frames())
     assert len(seen) == 1
 
