@@ -73,12 +73,12 @@ class After:
         held = work.remark in (CUT, UNRELATED)
         for frame in work.frames:
             if first is not None and frame.codes is work.first.codes:
-                yield replace(frame, key=False, codes=first)
+                yield replace(frame, key=False, codes=first, light=None)
                 continue
             before = state if frame.shot == work.shot else None
             since = self._voxels(work, 1 if held else frame.instant.share) if before else None
             codes, _ = self._processed(frame.codes, since, before)
-            yield replace(frame, key=False, codes=codes)
+            yield replace(frame, key=False, codes=codes, light=None)
         self._state, self._rest = state, self._voxels(work, 1)
 
     def memory(self) -> dict[str, np.ndarray]:

@@ -43,12 +43,14 @@ class Filled:
 
     key    whether it is a key frame, as it came
     shot   how many cuts there were before it
+    light  that of a key frame, where it is known better than by its codes
     """
 
     instant: Instant
     key: bool
     shot: int
     codes: np.ndarray = field(repr=False)
+    light: np.ndarray | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +122,7 @@ class Fill:
     def _made(self, stretch: Stretch, gap: Gap, method: Method, shot: int) -> Iterator[Filled]:
         instants = [instant for instant in stretch.instants if instant.share or not stretch.first.known]
         if len(instants) < len(stretch.instants):
-            yield Filled(stretch.instants[0], True, shot, stretch.first.codes)
+            yield Filled(stretch.instants[0], True, shot, stretch.first.codes, stretch.first.light)
         times = torch.tensor([float(instant.share) for instant in instants], device=self.device)
         coming = iter(instants)
         for images in method.images(gap, times, self.tiling):
@@ -134,7 +136,8 @@ class Fill:
         for instant in stretch.instants:
             later = stretch.second is not None and 2 * instant.share > 1
             nearer = stretch.second if later and stretch.second is not None else stretch.first
-            yield Filled(instant, not instant.share, shot + (later and stretch.between == CUT), nearer.codes)
+            its_shot = shot + (later and stretch.between == CUT)
+            yield Filled(instant, not instant.share, its_shot, nearer.codes, nearer.light)
 
     def _gap(self, stretch: Stretch, second: Key) -> Gap:
         frames = [_tensor(key).to(self.device) for key in (stretch.first, second)]

@@ -87,12 +87,12 @@ class OfSource:
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""
         for frame in self._source.frames(start):
-            yield Key(round(Fraction(frame.t_ns, 1000)), self._codes(frame.light))
+            light = np.nan_to_num(frame.light[..., : self.channels], nan=0.0, posinf=MOST_OF_HALF_FLOATS)
+            yield Key(round(Fraction(frame.t_ns, 1000)), self._codes(light), light=light if self.bright else None)
 
     def _codes(self, light: np.ndarray) -> np.ndarray:
-        """Of light [H, W, 3], [H, W, channels]."""
-        seen = torch.from_numpy(np.nan_to_num(light, nan=0.0, posinf=MOST_OF_HALF_FLOATS))
-        codes = to_codes(seen if self.channels == 3 else seen[..., :1], "srgb").numpy()
+        """Of light that is finite."""
+        codes = to_codes(torch.from_numpy(light), "srgb").numpy()
         if self._top:
             codes *= self._top
             np.rint(codes, out=codes)

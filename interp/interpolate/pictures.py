@@ -4,7 +4,8 @@ png    codes of 8 bits, or 16 where the source has more than 8, by the source's 
        key frames are the source's own
 mp4    codes of 8 bits by the source's own curve, so that the film is as bright as the source; by that of BT.709 where
        films have no name for it
-exr    float32, linear light, white at 1.0 and no upper end; needs the package OpenEXR
+exr    float32, linear light, white at 1.0 and no upper end; that of key frames of linear files, or of videos brighter
+       than white, is the source's own; needs the package OpenEXR
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ class Pictures:
         """What is written of a frame: codes, or light [H, W, 3]."""
         codes = frame.codes
         if self.kind == "exr":
-            light = to_light(torch.from_numpy(np.ascontiguousarray(codes)), "srgb").numpy()
+            light = frame.light
+            if light is None:
+                light = to_light(torch.from_numpy(np.ascontiguousarray(codes)), "srgb").numpy()
             return light if light.shape[2] == 3 else np.repeat(light, 3, axis=2)
         codes = codes if codes.shape[2] == 3 else codes[..., 0]
         picture = np.empty(codes.shape, np.uint8 if self.bits == 8 else np.uint16)

@@ -31,11 +31,13 @@ class Key:
     """A frame as it came: sRGB codes float32 [H, W, C], C 1 or 3, of which 1 is full code; and when [us].
 
     known   whether it shows what was there at that instant; otherwise that is to be made, too
+    light   linear, float32 [H, W, C], where codes do not hold it to the bit
     """
 
     t_us: int
     codes: np.ndarray = field(repr=False)
     known: bool = True
+    light: np.ndarray | None = field(default=None, repr=False)
 
 
 class Take(Protocol):

@@ -438,6 +438,27 @@ def test_a_lamp_of_infinite_light_is_as_bright_as_one_of_the_most_that_half_floa
     assert min(float(frame[14, 14].min()) for frame in made[0]) > 50
 
 
+@pytest.mark.parametrize("hdr", [False, True])
+def test_light_of_key_frames_is_the_files_own_to_the_bit(tmp_path: Path, hdr: bool) -> None:
+    pytest.importorskip("OpenEXR")
+    from vid2ev.scenes.picture_writing import writer_of
+
+    light = np.random.default_rng(3).lognormal(-1, 3, (3, 24, 32, 3)).astype(np.float32)
+    light[0, 0, 0] = -0.01, 0, 65504
+    (tmp_path / "in").mkdir()
+    for k, each in enumerate(light):
+        writer_of("exr")[0](each, tmp_path / "in" / f"{k}.exr")
+    (tmp_path / "in" / "timestamps.txt").write_text("# us\n0\n40000\n80000\n")
+    network = make("hdr", second="frames")
+    torch.nn.init.normal_(network.out.weight, std=0.05)
+    save(tmp_path / "hdr.safetensors", "hdr", network)
+    after: dict[str, Any] = {"hdr": tmp_path / "hdr.safetensors"} if hdr else {}
+    interpolate(tmp_path / "in", tmp_path / "out", multiple=2, method="linear", format="exr", cuts="keep", **after)
+    written = open_source(tmp_path / "out", colour="rgb").frames()
+    same = [np.array_equal(frame.light, light[k // 2]) for k, frame in enumerate(written) if k % 2 == 0]
+    assert same == 3 * [not hdr]
+
+
 def test_hdr_that_makes_no_numbers_is_said(tmp_path: Path) -> None:
     network = make("hdr", second="frames")
     torch.nn.init.constant_(network.out.bias, torch.nan)  # type: ignore[arg-type, union-attr]
