@@ -175,12 +175,13 @@ def test_events_out_of_order_are_put_in_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(got.t, gaps[0].t)
 
 
-@pytest.mark.parametrize(("images", "times", "count"), [(6, 4, 4), (4, 6, 4)])
+@pytest.mark.parametrize(("images", "times", "count"), [(6, 4, 4), (4, 6, 4), (1, 3, 1)])
 def test_as_many_pictures_as_times_belong_together(tmp_path: Path, images: int, times: int, count: int) -> None:
     written(tmp_path / "seq", images=images, times="".join(f"{STEP_US * (k + 1)}\n" for k in range(times)))
     sequence = open_sequence(tmp_path / "seq")
     assert len(sequence.times_us) == count
-    assert sequence.remarks[0] == f"{images} pictures and {times} times: the first 4 are taken for pairs"
+    said = f"{images} picture{'s' * (images > 1)} and {times} times: the first {count} are taken for pairs"
+    assert sequence.remarks[0] == said
 
 
 @pytest.mark.parametrize("head", ["0\n0\n", f"0\n0\n{9 * STEP_US}\n", f"{9 * STEP_US}\n", "0\nwrong\n0\n"])

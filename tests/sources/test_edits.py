@@ -173,6 +173,8 @@ def test_a_part_has_no_more_frames_than_the_whole(encode) -> None:
     ({"crop": "10x10+40+0"}, "has 48x32"),
     ({"crop": "49x2"}, "has 48x32"),
     ({"crop": "4x4+-1+0"}, "crop '4x4"),
+    ({"crop": (4, 4)}, "crop '(4, 4)'"),
+    ({"crop": 4}, "crop '4'"),
     ({"size": "0"}, "size '0'"),
     ({"size": "axb"}, "size 'axb'"),
     ({"size": "99999x10"}, "expected 1 to"),
@@ -483,4 +485,4 @@ def test_the_largest_part_of_a_shape_is_in_the_middle_along_both_sides() -> None
 
 
 def test_a_height_that_is_not_said_is_the_nearest() -> None:
-    assert parse_size("346", (1920, 1080)) == (346, 195, False)  # 194.6
+    assert parse_size("346", (1920, 1080)) == parse_size(346, (1920, 1080)) == (346, 195, False)  # 194.6

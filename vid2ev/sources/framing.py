@@ -42,7 +42,7 @@ class Box(NamedTuple):
 
 def crop_box(text: str, size: tuple[int, int]) -> Box:
     """The part that a crop means in a picture of `size`.  Raises UsageError."""
-    found = re.fullmatch(r"(\d{1,9})x(\d{1,9})(?:\+(\d{1,9})\+(\d{1,9}))?", text)
+    found = re.fullmatch(r"(\d{1,9})x(\d{1,9})(?:\+(\d{1,9})\+(\d{1,9}))?", str(text))
     if not found:
         raise UsageError(
             f"crop '{text}': expected WIDTHxHEIGHT+X+Y, or WIDTHxHEIGHT for the middle, such as 640x480+0+60"
@@ -58,7 +58,7 @@ def crop_box(text: str, size: tuple[int, int]) -> Box:
 
 def parse_size(size: str | Sequence[int], shape: tuple[int, int]) -> tuple[int, int, bool]:
     """Width, height and whether to stretch, of a size for pictures of the shape (width, height).  Raises UsageError."""
-    text = size if isinstance(size, str) else "x".join(map(str, size))
+    text = "x".join(map(str, size)) if np.ndim(size) else str(size)
     found = re.fullmatch(r"(\d{1,9})(?:x(\d{1,9})(!)?)?", text)
     if not found:
         raise UsageError(f"size '{text}': expected WIDTH, WIDTHxHEIGHT or WIDTHxHEIGHT!, such as 346x260")

@@ -27,6 +27,7 @@ from interp.data.picture_codes import codes_in
 from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
 from vid2ev.recording.exposures import LATEST_US
+from vid2ev.terminal import counted
 
 
 class Names(NamedTuple):
@@ -68,9 +69,9 @@ class Ergb:
         if len(stamps) != len(pictures):  # (a line for each: then lines that are no times have pictures, too)
             stamps = self._of_numbers(pictures, [t_us for t_us in stamps if t_us is not None])
         if not pictures or not stamps:
-            raise DataError(f"{folder}: {len(pictures)} pictures and {len(stamps)} times; expected some of both")
+            raise DataError(f"{folder}: {_both(pictures, stamps)}; expected some of both")
         if len(pictures) != len(stamps):
-            stamps = self._paired(len(pictures), stamps)
+            stamps = self._paired(pictures, stamps)
         timed = [(picture, t_us) for picture, t_us in zip(pictures, stamps, strict=False) if t_us is not None]
         if not timed:
             raise DataError(f"{folder}: no picture has a time; expected one to a line of {STAMPS[0]}")
@@ -122,11 +123,11 @@ class Ergb:
             raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
         return found
 
-    def _paired(self, pictures: int, stamps: list[int | None]) -> list[int | None]:
+    def _paired(self, pictures: list[Path], stamps: list[int | None]) -> list[int | None]:
         """The first times for as many pictures; the last ones where only these increase: lines above them are wrong."""
-        some = min(pictures, len(stamps))
+        some = min(len(pictures), len(stamps))
         which = "last" if not _increase(stamps[:some]) and _increase(stamps[-some:]) else "first"
-        self.remarks.append(f"{pictures} pictures and {len(stamps)} times: the {which} {some} are taken for pairs")
+        self.remarks.append(f"{_both(pictures, stamps)}: the {which} {some} are taken for pairs")
         return stamps[-some:] if which == "last" else stamps[:some]
 
     def _of_numbers(self, pictures: list[Path], stamps: list[int | None]) -> list[int | None]:
@@ -149,6 +150,10 @@ class Ergb:
         if strange := times.count(None):
             self.remarks.append(f"{strange} of the {len(times)} lines of {path.name} say no time")
         return times
+
+
+def _both(pictures: list[Path], stamps: list[int | None]) -> str:
+    return f"{counted(len(pictures), 'picture')} and {counted(len(stamps), 'time')}"
 
 
 def _increase(stamps: list[int | None]) -> bool:
