@@ -99,3 +99,10 @@ def test_a_file_of_events_is_of_one_source() -> None:
         assert isinstance(result.exception, UsageError)
         assert "--events events.csv: of one source, and here are 2" in str(result.exception)
         assert not Path("made").exists()
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_one_frame_is_not_frames(jobs: str) -> None:
+    images(Path("films/one"), moving(1))
+    result = run("films/f0", "films/one", "-o", "made", "--jobs", jobs)
+    assert result.exit_code == 0 and "1 frame\n" in result.output and "1 frames" not in result.output

@@ -13,6 +13,7 @@ import click
 
 from vid2ev.commands import as_told
 from vid2ev.errors import Vid2evError
+from vid2ev.terminal import counted
 
 if TYPE_CHECKING:
     from vid2ev.cluster.work import Outcome
@@ -132,7 +133,7 @@ def _done(made: dict[str, Any]) -> dict[str, Any]:
 
 def _told(result: dict[str, Any]) -> str:
     """What came of a video: its events, its frames, or the error."""
-    counts = [f"{result[what]:,} {what}" for what in ("events", "frames") if result.get(what) is not None]
+    counts = [counted(result[f"{what}s"], what) for what in ("event", "frame") if result.get(f"{what}s") is not None]
     return result.get("error", "".join(counts))
 
 
