@@ -18,6 +18,7 @@ from interp.own_codes import BRIGHT, curve_of, curve_of_film
 from interp.representation.dead_time import DeadTime
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.transfer import parse_transfer
 from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.recording.manifest import identity
 from vid2ev.sources.edit import unedited
@@ -57,7 +58,8 @@ class OfSource:
         said = str(self._about.get("transfer", "srgb"))
         whole = said == "srgb" and not self._about.get("edits", {}).get("resized", False)
         self._top = np.float32({"uint8": 255, "uint16": 65535}.get(str(self._about.get("type")), 0) * whole)
-        self.bright = said in BRIGHT
+        self._by_light = said in BRIGHT
+        self.bright = str(self._about.get("type")).startswith("float") or _goes_beyond_white(said)
         self.curve, self.coded = curve_of_film(said), curve_of(self._about)
         rate = self._about.get("fps") or self._about.get("rate")
         self.rate = Fraction(rate) if rate else self._mean_rate()
@@ -65,9 +67,7 @@ class OfSource:
     @property
     def remarks(self) -> list[str]:
         """Those of the source."""
-        clipped = [f"light above white is kept in EXR only: the transfer curve is {self._about.get('transfer')}"]
-        clipped *= self.bright
-        return [*map(_by_its_name, self._source.warnings), *clipped]
+        return [*map(_by_its_name, self._source.warnings)]
 
     @property
     def gaps_expected(self) -> int | None:
@@ -88,7 +88,7 @@ class OfSource:
         """See `Take`."""
         for frame in self._source.frames(start):
             light = np.nan_to_num(frame.light[..., : self.channels], nan=0.0, posinf=MOST_OF_HALF_FLOATS)
-            yield Key(round(Fraction(frame.t_ns, 1000)), self._codes(light), light=light if self.bright else None)
+            yield Key(round(Fraction(frame.t_ns, 1000)), self._codes(light), light=light if self._by_light else None)
 
     def _codes(self, light: np.ndarray) -> np.ndarray:
         """Of light that is finite."""
@@ -108,6 +108,11 @@ class OfSource:
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """None."""
         return None
+
+
+def _goes_beyond_white(curve: str) -> bool:
+    """Whether the highest code of a curve is brighter than white."""
+    return bool(parse_transfer(curve).to_light(np.ones(1))[0] > 1)
 
 
 def _is_grey(about: dict[str, Any]) -> bool:

@@ -275,10 +275,11 @@ def _brought(ready: Ready) -> list[str]:
 
 
 def _clipped(shelf: Shelf, ready: Ready) -> list[str]:
-    """That what HDR post-processing makes above white is not in what is made, if it is not."""
-    if ready.after is None or shelf.kind == "exr" or ready.take.bright:  # (of which the take says it)
+    """That light above white, of the source or of HDR post-processing, is not in what is made, if it is not."""
+    if shelf.kind == "exr" or not (ready.take.bright or ready.after):
         return []
-    return ["light above white, which HDR post-processing makes, is kept in EXR only: --format exr"]
+    made = "" if ready.take.bright else ", which HDR post-processing makes,"
+    return [f"light above white{made} is kept in EXR only: --format exr"]
 
 
 def _result(shelf: Shelf, ready: Ready) -> dict[str, Any]:

@@ -485,6 +485,30 @@ def test_what_hdr_makes_above_white_is_said_to_be_in_exr_only(tmp_path: Path, ki
         assert max(frame.light.max() for frame in open_source(output).frames()) > 1.05
 
 
+@pytest.mark.parametrize("kind", ["mp4", "png", "exr"])
+@pytest.mark.parametrize(
+    ("codes", "transfer", "bright"),
+    [
+        (np.uint8, "srgb", False), (np.uint8, "linear", False), (np.uint16, "linear", False), (np.uint8, "hlg", True),
+        (np.uint16, "pq", True), (np.float32, "linear", True), (np.float32, "srgb", True),
+    ],
+)  # fmt: skip
+def test_that_light_above_white_is_lost_is_said_where_there_may_be_some_and_it_is(
+    tmp_path: Path, kind: str, codes: type[np.generic], transfer: str, bright: bool
+) -> None:
+    if kind == "exr":
+        pytest.importorskip("OpenEXR")
+    top = 255 if codes is np.uint8 else 65535 if codes is np.uint16 else 2
+    shown = np.stack([top * (frame / 255) for frame in moving(2)]).astype(codes)
+    shown[:, :8] = top
+    np.savez(tmp_path / "in.npz", frames=shown, t_us=np.array([0, 40_000]))
+    output = tmp_path / f"out{'.mp4' * (kind == 'mp4')}"
+    told = interpolate(tmp_path / "in.npz", output, multiple=1, format=kind, options=Options(transfer=transfer))  # type: ignore[arg-type]
+    assert any("above white" in remark for remark in told["remarks"]) == (bright and kind != "exr")
+    if kind == "exr":
+        assert (max(frame.light.max() for frame in open_source(output).frames()) > 1) == bright
+
+
 def test_hdr_makes_no_light_above_white_darker(tmp_path: Path) -> None:
     pytest.importorskip("OpenEXR")
     from vid2ev.scenes.picture_writing import writer_of
