@@ -22,6 +22,7 @@ import numpy as np
 
 from interp.data.layouts.sequence import NO_LATER
 from interp.evaluate.group import Cameras, Group
+from interp.evaluate.pairing import Numbers
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
 from interp.own_codes import curve_of
@@ -29,6 +30,7 @@ from interp.representation.dead_time import DeadTime, look_back_us
 from interp.representation.event_counts import count_events
 from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.recognise import pictures_in
 from vid2ev.recording.manifest import identity
 from vid2ev.sources import is_scene
 from vid2ev.terminal import counted
@@ -102,6 +104,14 @@ class Film:
             for _ in source.frames():
                 count += 1
         return count
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of a folder of pictures that is scored from its first to its last."""
+        if not Path(self.video).is_dir() or {"start", "stop"} & self._simulated.options.keys():
+            return []
+        found = Numbers.of_names(pictures_in(Path(self.video))).of
+        return found if len(found) == self.frames else []
 
     def groups(self) -> Iterator[Group]:
         """See `interp.evaluate.group.Footage`; those across a cut, or of no time, are counted."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -64,6 +64,7 @@ class Footage(Protocol):
     called      what folders of others' pictures of it may be called, the likeliest first
     expected    number of groups, for progress; may be an estimate
     begin       the first key frame
+    numbers     those that the names of its own pictures end in, one for each frame; none where there are none
     protocol    which frames are rebuilt
     limit       gaps that are scored, from the first on; None for all
     identity    what tells it from another, ready for JSON
@@ -73,6 +74,7 @@ class Footage(Protocol):
     called: tuple[str, ...]
     expected: int
     begin: int
+    numbers: Sequence[int]
     protocol: protocols.Protocol
     limit: int | None
     identity: dict[str, Any]

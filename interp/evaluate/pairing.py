@@ -3,8 +3,10 @@
     as many as frames             one for each, the first is a key frame
     as many as are rebuilt        one for each of those of all gaps, or of those asked for; key frames are left out
     as many as are skipped        likewise, where others are rebuilt than were skipped; or as are scored of these
-    else                          by the number that their names end in: 0 is the first frame, a key frame
+    else                          by the number that their names end in: 0 is the first frame, a key frame; or that
+                                  of the sequence's own picture, where these are numbered otherwise
 
+Of the last two, that which has pictures of frames that are scored alone; where both or neither have, the first.
 Numbers without a gap are counted; those with gaps are of frames, unless they are those of the rebuilt frames by their
 own count.  Where a count from 0 may be either, nobody can tell.
 """
@@ -96,12 +98,20 @@ class Gaps(NamedTuple):
         return (*found, self.begin + gaps * multiple) if keys else (*found,)
 
 
-def paired(files: Sequence[Path], frames: int, protocol: Protocol, begin: int = 0, limit: int | None = None) -> Paired:
+def paired(
+    files: Sequence[Path],
+    frames: int,
+    protocol: Protocol,
+    begin: int = 0,
+    limit: int | None = None,
+    own: Sequence[int] = (),
+) -> Paired:
     """Pictures, in order of their names, by the number of the frame that each is of.
 
     frames   how many the sequence has
     begin    the first key frame
     limit    gaps that are asked for, from the first on; None for all
+    own      numbers of the sequence's own pictures, if it has any
     Raises DataError where there is no telling.
     """
     if not files:
@@ -114,9 +124,12 @@ def paired(files: Sequence[Path], frames: int, protocol: Protocol, begin: int = 
         for found in fitting.values():
             files_of = {frame: path for frame, path in zip(found.frames, files, strict=True) if frame is not None}
             return Paired(files_of, f"{len(files)} pictures {found.said}" if found.said else "")
+    if found := _of_own(gaps, numbers, own):
+        return Paired(dict(zip(found.frames, files, strict=True)), f"{len(files)} pictures {found.said}")
     if not _of_frames(gaps, numbers):
         raise _unknown(files, gaps, numbers)
     plain = protocol.insert == protocol.skip and not numbers.counted_from(0) and max(numbers.of) < frames
+    plain &= not own or [*own] == [*range(frames)]
     remark = "" if plain else f"{len(files)} pictures for {frames} frames {_by_number(numbers)}"
     return Paired(dict(zip(numbers.of, files, strict=True)), remark)
 
@@ -167,6 +180,20 @@ def _of_frames(gaps: Gaps, numbers: Numbers) -> bool:
         count = len(numbers.of)
         return bool(count % protocol.insert) or protocol.insert * gaps.every <= count <= gaps.frames
     return {*numbers.of} <= {*gaps.within(gaps.skipped, gaps.every)}
+
+
+def _of_own(gaps: Gaps, numbers: Numbers, own: Sequence[int]) -> Reading | None:
+    """Numbers as those of the sequence's own pictures, where these are of frames that are scored alone, and as numbers
+    of frames they are not."""
+    frame_of = {number: frame for frame, number in enumerate(own)}
+    if not numbers.of or not {*numbers.of} <= frame_of.keys():
+        return None
+    named = [frame_of[number] for number in numbers.of]
+    scored = {*gaps.within([*gaps.protocol.positions], gaps.every)}
+    if {*numbers.of} <= scored or not {*named} <= scored:
+        return None
+    ends = f"{min(numbers.of)} to {max(numbers.of)}"
+    return Reading((*named,), f"are taken for the frames whose own pictures have the same numbers, {ends}")
 
 
 def _own_count(gaps: Gaps, count: int) -> list[int]:

@@ -50,7 +50,9 @@ class Predictions:
             return replace(self, files={}, unpaired=missing, unfit={}, remarks=())
         files = next(filter(None, map(pictures_in, places)), [])
         try:
-            known, remark = paired(files, footage.frames, footage.protocol, footage.begin, footage.limit)
+            known, remark = paired(
+                files, footage.frames, footage.protocol, footage.begin, footage.limit, footage.numbers
+            )
             return replace(self, files=known, unpaired="", unfit={}, remarks=(remark,) if remark else ())
         except DataError as error:
             return replace(self, files={}, unpaired=str(error), unfit={}, remarks=())

@@ -10,9 +10,11 @@ import numpy as np
 
 from interp.data.between import events_between
 from interp.data.layouts import Sequence, windows
+from interp.data.layouts.ergb import Ergb
 from interp.data.layouts.own import Own
 from interp.evaluate.cameras import CamerasOf
 from interp.evaluate.group import Cameras, Group
+from interp.evaluate.pairing import Numbers
 from interp.evaluate.protocol import Protocol
 from interp.representation.carried import over
 from vid2ev.errors import DataError
@@ -43,6 +45,7 @@ class Recording:
         self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
         self.begin = self._own_keys[0] if self._own_keys else 0
         self.frames = len(self._sequence.times_us)
+        self.numbers = Numbers.of_names(self._sequence.pictures).of if isinstance(self._sequence, Ergb) else []
         found = windows(self._sequence, protocol.multiple, protocol.multiple, self.begin)
         self._not_scored = dict(found.unusable)
         self._firsts = [int(first) for first in found.first][:limit]

@@ -551,6 +551,53 @@ def test_predictions_that_may_be_of_frames_or_a_count_of_their_own_are_refused(
         paired(files, 19, Protocol(7, insert), limit=limit)
 
 
+OWN = [range(1, 18), range(40, 57), [*range(6), *range(7, 18)], range(0, 51, 3)]
+
+
+@pytest.mark.parametrize("own", OWN)
+def test_predictions_that_are_called_as_the_pictures_of_their_sequence_are_of_these(own: Iterable[int]) -> None:
+    numbers, scored = [*own], [k for k in range(17) if k % 4]
+    files = {k: Path(f"{numbers[k]:06d}.png") for k in scored}
+    assert paired([*files.values()], 17, Protocol(3, 3), own=numbers).files == files
+    counted = {k: Path(f"{k:06d}.png") for k in scored}  # (as frames are counted, whatever their pictures are called)
+    assert paired([*counted.values()], 17, Protocol(3, 3), own=numbers).files == counted
+    everything = {k: Path(f"{number:06d}.png") for k, number in enumerate(numbers)}
+    assert paired([*everything.values()], 17, Protocol(3, 3), own=numbers).files == everything
+
+
+@pytest.mark.parametrize("own", OWN)
+def test_of_predictions_of_which_some_are_missing_it_is_said_whose_numbers_they_have(own: Iterable[int]) -> None:
+    numbers, scored, draw = [*own], [k for k in range(17) if k % 4], np.random.default_rng(0)
+    for _ in range(50):
+        some = sorted(draw.choice(scored, draw.integers(1, 12), replace=False).tolist())
+        files = {k: Path(f"{numbers[k]:06d}.png") for k in some}
+        try:
+            found = paired([*files.values()], 17, Protocol(3, 3), own=numbers)
+        except DataError:
+            continue
+        assert found.files == files or found.remark
+
+
+def test_predictions_of_folders_that_are_numbered_otherwise_are_compared_with_what_they_are_called_as(
+    tmp_path: Path,
+) -> None:
+    truth = pictures(14)
+    write_hsergb(tmp_path / "data" / "seq", truth)
+    (tmp_path / "data" / "seq" / "images_corrected" / "000006.png").unlink()
+    write_predictions(tmp_path / "frames", truth)  # frame0.png ...
+    (tmp_path / "frames" / "frame0.png").rename(tmp_path / "frames" / "frame14.png")
+    for name, called in (("seq", [1, 2, 3, 5, 7, 8, 10, 11, 12]), ("frames", [2, 3, 4, 6, 7, 8, 10, 11, 12])):
+        (tmp_path / "theirs" / name).mkdir(parents=True)
+        for k in called:
+            write_codes(tmp_path / "theirs" / name / f"{k:03d}.png", truth[k])
+    options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
+    options["simulated"] = Simulated.of("clean", fps=250)
+    found = evaluate([str(tmp_path / "data"), str(tmp_path / "frames")], tmp_path / "report", **options)
+    assert found.summary["methods"]["theirs"]["perfect"] == len(found.rows) == 18
+    said = "theirs: 9 pictures are taken for the frames whose own pictures have the same numbers, "
+    assert {f"seq: {said}1 to 12", f"frames: {said}2 to 12"} <= {*notes(found.summary)}
+
+
 def test_where_pictures_were_paired_by_less_than_their_number_it_is_said(tmp_path: Path) -> None:
     truth = pictures(9)
     write_hsergb(tmp_path / "seq", truth)

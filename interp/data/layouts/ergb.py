@@ -51,6 +51,7 @@ STAMPS = ("timestamp.txt", "timestamps.txt")
 class Ergb:
     """A sequence in one of the two layouts.
 
+    pictures   the files of its frames
     Raises DataError for a folder that has no pictures, or no times for them.
     """
 
@@ -75,7 +76,7 @@ class Ergb:
         timed = [(picture, t_us) for picture, t_us in zip(pictures, stamps, strict=False) if t_us is not None]
         if not timed:
             raise DataError(f"{folder}: no picture has a time; expected one to a line of {STAMPS[0]}")
-        self._images = [picture for picture, _ in timed]
+        self.pictures = [picture for picture, _ in timed]
         self.times_us = np.array([t_us for _, t_us in timed], np.int64)
         self.size = self._picture(0).shape[1::-1]
         self.event_size = self.size
@@ -100,8 +101,8 @@ class Ergb:
         if picture.shape[1::-1] != self.size:
             (width, height), (wide, high) = picture.shape[1::-1], self.size
             raise DataError(
-                f"{self._images[k]}: {width}x{height} pixels, expected {wide}x{high} as the first picture has; leave it"
-                " out with its time"
+                f"{self.pictures[k]}: {width}x{height} pixels, expected {wide}x{high} as the first picture has; leave"
+                " it out with its time"
             )
         return picture
 
@@ -118,9 +119,9 @@ class Ergb:
         return self._parts.between(start_us, stop_us)
 
     def _picture(self, k: int) -> np.ndarray:
-        found = codes_in(self._images[k])
+        found = codes_in(self.pictures[k])
         if found is None:
-            raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
+            raise DataError(f"{self.pictures[k]} is no picture that can be read; leave it out with its time")
         return found
 
     def _paired(self, pictures: list[Path], stamps: list[int | None]) -> list[int | None]:
