@@ -120,9 +120,11 @@ def train(
     _note(notes, machines, quiet)
     if dry_run:
         from interp.train.made_of import learner_of
+        from interp.train.run_folder import check_place
         from interp.train.starts import begin
         from interp.train.told import described
 
+        check_place(path, job.kept([path]), resume)
         begin(learner_of(job), starts)
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return

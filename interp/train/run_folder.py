@@ -39,10 +39,10 @@ from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
-FINISHED, WENT_ON = "finished.json", "went_on_with"
+FINISHED, WENT_ON, CLIPS = "finished.json", "went_on_with", "clips"
 MAKE_ROOM = "make room or access there, then --resume"
 LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
-OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in `clips`, which is removed in the end
+OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in it, which is removed in the end
 
 
 class RunFolder:
@@ -66,11 +66,11 @@ class RunFolder:
         job = json.loads(json.dumps(job))
         if not first:  # (the process that leads has looked, and holds the folder)
             return
-        self._check(job, resume)  # (before anything is written where something else is)
+        check_place(self.path, job, resume)  # (before anything is written where something else is)
         try:
             with writing(path, "make room or access there, or choose another folder with -o"):
                 self._held.take()
-                self._check(job, resume)  # (another may have begun there until now)
+                check_place(self.path, job, resume)  # (another may have begun there until now)
                 self._begin(job, resume, starts)
         except BaseException:
             self.close()
@@ -124,7 +124,7 @@ class RunFolder:
     @property
     def clips(self) -> Path:
         """A cache: what is missing there is made again."""
-        return self.path / "clips"
+        return self.path / CLIPS
 
     @property
     def pictures(self) -> Path:
@@ -203,29 +203,6 @@ class RunFolder:
                 file.write(starts[part].read_bytes())
         self._write("run.json", {"job": job, **made_with})
 
-    def _check(self, job: Mapping[str, Any], resume: bool) -> None:
-        if self.path.exists() and not self.path.is_dir():
-            raise UsageError(f"{self.path} is a file; choose a folder with -o")
-        begun = (self.path / "run.json").exists()
-        if not resume:
-            if begun:
-                raise UsageError(f"{self.path} holds a run; --resume goes on with it, -o chooses another folder")
-            if self.path.is_dir() and not all(map(self._is_ours, self.path.iterdir())):
-                raise UsageError(f"{self.path} holds files that are no run; choose another folder with -o")
-            return
-        changed = difference(begun_job(self.path), job)
-        if changed:
-            raise UsageError(
-                f"{self.path} was begun with {changed}; --resume needs what it was begun with, -o starts another run"
-            )
-
-    def _is_ours(self, child: Path) -> bool:
-        """Whether it is what a run leaves that is killed before it has begun, or clips, which another machine may be
-        making already; neither is a reason not to begin."""
-        if child == self.clips:
-            return child.is_dir() and all(OF_CLIPS.fullmatch(each.name) for each in child.iterdir())
-        return LEFT.fullmatch(child.name) is not None
-
     def _keep(self, name: str, content: Mapping[str, Any]) -> None:
         """Write what comes to be known while it trains."""
         with writing(self.path / name, MAKE_ROOM):
@@ -238,6 +215,32 @@ class RunFolder:
 
 def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
+
+
+def check_place(path: Path, job: Mapping[str, Any], resume: bool) -> None:
+    """Raise UsageError where the folder of a run is taken, or was begun with another job; nothing is written."""
+    if path.exists() and not path.is_dir():
+        raise UsageError(f"{path} is a file; choose a folder with -o")
+    begun = (path / "run.json").exists()
+    if not resume:
+        if begun:
+            raise UsageError(f"{path} holds a run; --resume goes on with it, -o chooses another folder")
+        if path.is_dir() and not all(map(_is_ours, path.iterdir())):
+            raise UsageError(f"{path} holds files that are no run; choose another folder with -o")
+        return
+    changed = difference(begun_job(path), json.loads(json.dumps(job)))
+    if changed:
+        raise UsageError(
+            f"{path} was begun with {changed}; --resume needs what it was begun with, -o starts another run"
+        )
+
+
+def _is_ours(child: Path) -> bool:
+    """Whether it is what a run leaves that is killed before it has begun, or clips, which another machine may be making
+    already; neither is a reason not to begin."""
+    if child.name == CLIPS:
+        return child.is_dir() and all(OF_CLIPS.fullmatch(each.name) for each in child.iterdir())
+    return LEFT.fullmatch(child.name) is not None
 
 
 def begun_job(path: Path) -> dict[str, Any]:

@@ -118,6 +118,20 @@ def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
+def test_a_dry_run_refuses_the_folder_that_training_would_refuse() -> None:
+    assert run(*FEW, "--seed", "7", "-o", "run", "--session", "0.001s").exit_code == 0
+    Path("mine").mkdir()
+    Path("mine/notes.txt").write_text("of somebody")
+    Path("file").write_text("")
+    before = sorted(Path(".").rglob("*"))
+    for asked in (["-o", "run"], ["-o", "mine"], ["-o", "file"], ["-o", "run", "--resume", "--seed", "8"]):
+        dry, real = (run(*FEW[:2], *asked, *more) for more in (["--dry-run"], []))
+        assert dry.exit_code == real.exit_code == 2 and dry.output == real.output, dry.output
+    goes_on = run("-o", "run", "--resume", "--dry-run")
+    assert goes_on.exit_code == 0 and "3 steps of" in goes_on.output, goes_on.output
+    assert sorted(Path(".").rglob("*")) == before
+
+
 def test_clips_are_made_on_the_cpu_where_there_is_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vid2ev.sensors.devices.missing_for_cuda", lambda: "torch sees no GPU")
     done = run(*FEW, "-o", "run", "--clips-on", "cuda")
