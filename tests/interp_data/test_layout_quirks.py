@@ -212,7 +212,9 @@ def test_a_picture_that_is_missing_takes_its_time_along(tmp_path: Path, head: st
     sequence = open_sequence(tmp_path / "seq")
     assert sequence.times_us.tolist() == [STEP_US * (k + 1) for k in (0, 1, 3, 4, 5)]
     assert [int(sequence.frame(k)[0, 0, 0]) for k in range(5)] == [5, 15, 35, 45, 55]
-    assert "1 of 6 pictures are missing: their times are left out" in sequence.remarks
+    assert "1 of 6 pictures is missing: its time is left out" in sequence.remarks
+    (tmp_path / "seq" / "images_corrected" / "000006.png").unlink()
+    assert "2 of 6 pictures are missing: their times are left out" in open_sequence(tmp_path / "seq").remarks
 
 
 def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
@@ -282,7 +284,7 @@ def test_a_missing_file_costs_its_own_stretch_and_is_named(tmp_path: Path, layou
     files = sorted((tmp_path / "seq" / LAYOUTS[layout].events).iterdir())
     files[3].unlink()
     sequence = open_sequence(tmp_path / "seq")
-    assert sequence.remarks == [f"1 event files are missing before {files[4].name}"]
+    assert sequence.remarks == [f"1 event file is missing before {files[4].name}"]
     found = windows(sequence, 1)
     np.testing.assert_array_equal(found.first, [0, 1, 5, 6])
     assert found.unusable == {"a file of events is missing or cannot be read": 3}

@@ -138,7 +138,9 @@ class Ergb:
         span = numbers[-1] - numbers[0] + 1 if numbers else 0
         if span != len(stamps) or span == len({*numbers}) or len({*numbers}) < len(numbers):
             return stamps
-        self.remarks.append(f"{span - len(numbers)} of {span} pictures are missing: their times are left out")
+        missing = span - len(numbers)
+        said = "is missing: its time is" if missing == 1 else "are missing: their times are"
+        self.remarks.append(f"{missing} of {span} pictures {said} left out")
         return [stamps[number - numbers[0]] for number in numbers]
 
     def _stamps(self, folder: Path) -> list[int | None]:

@@ -24,6 +24,7 @@ import numpy as np
 from interp.data.layouts.sequence import Placed
 from vid2ev.errors import DataError
 from vid2ev.stamps import Stamp, stamp
+from vid2ev.terminal import counted
 from vid2ev.untrusted import first_line, read_arrays
 
 SCALE = 32.0
@@ -113,7 +114,8 @@ class EventParts:
             since_us, until_us = self._unknown(k, k)
             if missing > 0 and until_us - since_us > LEAST_MISSING * typical_us:
                 found.append((since_us, until_us))
-                self.remarks.append(f"{missing} event files are missing before {self.paths[k].name}")
+                said = f"{counted(missing, 'event file')} {'is' if missing == 1 else 'are'}"
+                self.remarks.append(f"{said} missing before {self.paths[k].name}")
         return found
 
     def _unknown(self, stop: int, start: int) -> tuple[int, int]:
