@@ -132,11 +132,12 @@ def evaluate(
     if as_json:
         click.echo(json.dumps(found.summary, indent=2))
         return
-    if not quiet:
-        for table in (protocol_table(found.rows), full_scale_table(found.rows)):
-            click.echo(f"{table.title}\n\n{aligned(table)}\n")
-        sequences = counted(len(found.summary["sequences"]), "sequence")
-        click.echo(f"{folder / PAGE}: {counted(len(found.rows), 'row')} of {sequences}")
+    if quiet:
+        return
+    for table in (protocol_table(found.rows), full_scale_table(found.rows)):
+        click.echo(f"{table.title}\n\n{aligned(table)}\n")
+    sequences = counted(len(found.summary["sequences"]), "sequence")
+    click.echo(f"{folder / PAGE}: {counted(len(found.rows), 'row')} of {sequences}")
     for note in (*notes(found.summary), *filter(None, (uneven(found.rows),))):
         click.echo(f"note: {note}", err=True)
 

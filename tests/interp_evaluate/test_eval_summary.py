@@ -211,6 +211,8 @@ def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypa
     assert shown.exit_code == 0, shown.output
     assert "set_eval/report.html: 28 rows of 1 sequence\n" in shown.stdout
     assert "note: seq: not rebuilt: 1 frame after the last complete group of 8" in shown.stderr
+    quiet = run("set", "--baseline", "linear", "--baseline", "bridge", "--resume", "-q")
+    assert quiet.exit_code == 0 and quiet.output == quiet.stderr == ""
     text, page = ((tmp_path / "set_eval" / name).read_text() for name in ("report.md", "report.html"))
     assert "not rebuilt: 1 frame after the last complete group of 8" in text and "seed" not in text
     assert page.count("data:image/png") == 2 * 2  # of the worst frames of both, of two gaps
