@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 import wave
 import weakref
 from collections.abc import Callable, Iterator
@@ -96,6 +97,56 @@ def test_a_clip_that_starts_late_keeps_its_times(encode) -> None:
     path = encode("a.mkv", flat([1, 2, 3]), stamps=[hours, hours + 33, hours + 66], time_base=Fraction(1, 1000))
     times = [frame.t_ns for frame in open_source(path).frames()]
     assert times == [(hours + k) * 1_000_000 for k in (0, 33, 66)]
+
+
+def with_edits(path: Path, edits: list[tuple[int, int]]) -> Path:
+    """An MP4 by libavformat whose edit list is another: (how long [ms], from which tick of the stream on, -1 for
+    nothing) each.  Source: ISO/IEC 14496-12 sections 8.6.5 and 8.6.6."""
+
+    def box(kind: bytes, content: bytes) -> bytes:
+        return struct.pack(">I4s", 8 + len(content), kind) + content
+
+    entries = b"".join(struct.pack(">Iihh", *edit, 1, 0) for edit in edits)
+    data = path.read_bytes()
+    moov, trak, edts = (data.rindex(kind) - 4 for kind in (b"moov", b"trak", b"edts"))
+    made = box(b"edts", box(b"elst", struct.pack(">II", 0, len(edits)) + entries))
+    (old,) = struct.unpack_from(">I", data, edts)
+    changed = bytearray(data[:edts] + made + data[edts + old :])
+    for outer in (moov, trak):  # (which is behind the pictures, so these stay where they are)
+        struct.pack_into(">I", changed, outer, struct.unpack_from(">I", data, outer)[0] + len(made) - old)
+    path.write_bytes(changed)
+    return path
+
+
+@pytest.mark.parametrize("reordered", [0, 2])
+@pytest.mark.parametrize(("edits", "shown"), [
+    ([(480, 0)], range(12)),
+    ([(400, -1), (480, 0)], range(12)),  # begins late
+    ([(320, 4)], range(4, 12)),  # its beginning is cut off
+    ([(200, 0)], range(5)),  # its end is
+    ([(200, -1), (280, 3)], range(3, 10)),
+    ([(160, 8), (160, 0)], [8, 9, 10, 11, 0, 1, 2, 3]),
+    ([(120, 3), (120, 3)], [3, 4, 5, 3, 4, 5]),
+])  # fmt: skip
+def test_an_edit_list_says_what_is_shown_and_when(encode, reordered: int, edits, shown) -> None:
+    """Frames that it hides are none that are missing."""
+    options = {"bf": str(reordered), "crf": "1", "g": "6"}
+    path = encode(
+        "a.mp4", flat([20 * k + 10 for k in range(12)]), codec="libx264", time_base=Fraction(1, 25), options=options
+    )
+    whole = [frame.light for frame in open_source(path).frames()]
+    with av.open(str(path)) as container:
+        tick_s = container.streams.video[0].time_base
+    first, frame = (Fraction(k, 25) / tick_s for k in (min(reordered, 2), 1))  # (stored as so much late)
+    with_edits(path, [(ms, -1 if k < 0 else int(first + k * frame)) for ms, k in edits])
+    begin_ms = edits[0][0] if edits[0][1] < 0 else 0
+    source = open_source(path)
+    frames = list(source.frames())
+    assert [frame.t_ns for frame in frames] == [(begin_ms + 40 * k) * 10**6 for k in range(len(shown))]
+    for seen, k in zip(frames, shown, strict=True):
+        np.testing.assert_array_equal(seen.light, whole[k])
+    assert source.warnings == [] and source.frames_expected == len(shown)
+    assert len(list(open_source(path, start=frames[2].t_ns / 1e9).frames())) == len(shown) - 2
 
 
 @pytest.mark.parametrize("begin_s", [0, Fraction(1, 10), 5, 100_000])

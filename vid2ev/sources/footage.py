@@ -69,7 +69,7 @@ class VideoFile:
         self._format = "apng" if self.path.is_file() and is_animated_png(self.path) else None
         with self._opened() as (container, stream):
             self.rate, self.pixel_shape, self.codec = _said_of(stream)
-            self.planned: int = stream.frames
+            self.planned = _announced(container, stream)
             self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
             self.first = next(_decoded(container, stream, self.planned, []), None)
             if self.first is None:
@@ -205,6 +205,13 @@ def _said_of(stream: Any) -> tuple[Fraction | None, Fraction, str]:
     return Fraction(rate) if rate else None, Fraction(stream.sample_aspect_ratio or 1), stream.codec_context.name
 
 
+def _announced(container: Any, stream: Any) -> int:
+    """Frames by the header, 0 if it does not say; of those that are stored, the ones that an edit list shows."""
+    if not stream.frames or "mp4" not in container.format.name.split(","):
+        return int(stream.frames)
+    return sum(not entry.is_discard for entry in stream.index_entries)
+
+
 def stamp_of(picture: Any) -> Fraction | None:
     """Presentation time [s] of a picture."""
     return None if picture.pts is None else picture.pts * Fraction(picture.time_base)
@@ -277,7 +284,7 @@ def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -
         if packet.is_corrupt:  # (cut off in the middle; the decoder would invent the rest)
             broken += 1
             continue
-        whole += packet.size > 0
+        whole += packet.size > 0 and not packet.is_discard  # (what an edit list hides leads to what it shows)
         if checked and packet.size:
             right = is_sound(bytes(packet))
             sound, unsound = sound + right, unsound + (not right)
