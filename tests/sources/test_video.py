@@ -649,6 +649,30 @@ def test_pixels_that_are_not_square_are_remarked_on(encode, aspect: Fraction, ma
         assert not open_source(encode("b.mp4", pictures, sample_aspect_ratio=nearly, **tags)).warnings
 
 
+@pytest.mark.parametrize("name", ["a.mp4", "a.mkv"])
+def test_other_video_streams_than_the_first_are_remarked_on_but_no_covers(tmp_path: Path, name: str) -> None:
+    covers = [(1, True)] if name == "a.mp4" else []  # (Matroska has them as attachments)
+    for streams, cover in ((1, False), (3, False), *covers):
+        path = tmp_path / f"{streams}{cover}{name}"
+        with av.open(str(path), "w") as container:
+            made = [container.add_stream("mpeg4", rate=25) for _ in range(streams)]
+            if cover:
+                made.append(container.add_stream("mjpeg", rate=25))
+            for stream in made:
+                stream.width, stream.height = 48, 32
+                stream.pix_fmt = "yuv420p" if stream in made[:streams] else "yuvj420p"
+            for stream in made[streams:]:
+                stream.disposition = av.stream.Disposition.attached_pic
+            for stream in made[::-1]:
+                picture = chroma_too(90).reformat(format=stream.pix_fmt)
+                picture.pts = 0
+                container.mux(stream.encode(picture))
+                container.mux(stream.encode(None))
+        warnings = open_source(path).warnings
+        expected = [f"the first of {streams} video streams is read"] if streams > 1 else []
+        assert [warning.split(";")[0] for warning in warnings] == expected
+
+
 def write_sound(path: Path) -> None:
     with wave.open(str(path), "wb") as sound:
         sound.setnchannels(1)

@@ -41,6 +41,7 @@ class Footage(Protocol):
     codec: str
     rate: Fraction | None  # nominal, frames per second
     pixel_shape: Fraction  # width of a stored pixel by its height, 1 if nobody says
+    streams: int  # of video, of which this is the first
     planned: int  # frames by the header, 0 if it does not say
     end_s: Fraction | None  # by the header, on the clock of the pictures
     first: Any  # the first picture
@@ -68,7 +69,7 @@ class VideoFile:
         # FFmpeg takes one for a still where it says that it moves behind a large profile
         self._format = "apng" if self.path.is_file() and is_animated_png(self.path) else None
         with self._opened() as (container, stream):
-            self.rate, self.pixel_shape, self.codec = _said_of(stream)
+            self.rate, self.pixel_shape, self.codec, self.streams = _said_of(stream)
             self.planned = _announced(container, stream)
             self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
             self.first = next(_decoded(container, stream, self.planned, []), None)
@@ -132,7 +133,7 @@ class Piped:
     def __init__(self, kept: Kept):
         self.name, self.kept = kept.name, kept
         with self._opened(kept.reader()) as (container, stream):
-            self.rate, self.pixel_shape, self.codec = _said_of(stream)
+            self.rate, self.pixel_shape, self.codec, self.streams = _said_of(stream)
             self.first = next(_decoded(container, stream, 0, []), None)
             kept.wanted = False
             if self.first is None:
@@ -171,7 +172,7 @@ class LiveStream:
     def __init__(self, container: Any, name: str):
         self.name = name
         stream = video_stream(container, name)
-        self.rate, self.pixel_shape, self.codec = _said_of(stream)
+        self.rate, self.pixel_shape, self.codec, self.streams = _said_of(stream)
         self._remarks: list[str] = []
         self._coming: Iterator[Any] | None = _decoded(container, stream, 0, self._remarks)
         self._container = container  # (closed with the last reference to it)
@@ -190,7 +191,7 @@ class LiveStream:
 
 def video_stream(container: Any, name: str) -> Any:
     """The first video stream that is no cover picture.  Raises DataError."""
-    streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
+    streams = _video_streams(container)
     if not streams or container.format.name == "tty":  # (FFmpeg draws text files as video)
         raise DataError(f"{name}: holds no video stream; {REMEDY}")
     if streams[0].codec_context is None:
@@ -199,10 +200,16 @@ def video_stream(container: Any, name: str) -> Any:
     return streams[0]
 
 
-def _said_of(stream: Any) -> tuple[Fraction | None, Fraction, str]:
-    """What a stream says of itself: nominal frames per second, width of a pixel by its height, and its codec."""
-    rate = stream.average_rate or stream.guessed_rate
-    return Fraction(rate) if rate else None, Fraction(stream.sample_aspect_ratio or 1), stream.codec_context.name
+def _video_streams(container: Any) -> list[Any]:
+    """Those that are no cover pictures."""
+    return [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
+
+
+def _said_of(stream: Any) -> tuple[Fraction | None, Fraction, str, int]:
+    """What a stream says of itself: nominal frames per second, width of a pixel by its height, and its codec; and how
+    many of video there are."""
+    rate, shape = stream.average_rate or stream.guessed_rate, Fraction(stream.sample_aspect_ratio or 1)
+    return Fraction(rate) if rate else None, shape, stream.codec_context.name, len(_video_streams(stream.container))
 
 
 def _announced(container: Any, stream: Any) -> int:

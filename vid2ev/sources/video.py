@@ -36,10 +36,10 @@ class Video:
     colour    "luminance" or "rgb"
 
     Display rotation and mirroring of the file are applied; pixels that are not square are taken for square, and
-    `warnings` says so.  Frames whose time is not after the frame before are dropped, and frames without a time are
-    placed by the frame rate; both are counted in `warnings`, and so is what is missing of a truncated file.  A camera's
-    clock starts at its first frame.  Raises DataError if the codes of the footage have no known meaning, UsageError for
-    a transfer or fps that cannot be meant.
+    `warnings` says so, as it does of other streams of video.  Frames whose time is not after the frame before are
+    dropped, and frames without a time are placed by the frame rate; both are counted in `warnings`, and so is what is
+    missing of a truncated file.  A camera's clock starts at its first frame.  Raises DataError if the codes of the
+    footage have no known meaning, UsageError for a transfer or fps that cannot be meant.
     """
 
     dense = False
@@ -73,6 +73,11 @@ class Video:
                 " picture of each"
             )
         self.warnings += self._not_square()
+        if footage.streams > 1:
+            self.warnings.append(
+                f"the first of {footage.streams} video streams is read; ffmpeg -i VIDEO -map 0:V:1 -c copy OTHER.mkv"
+                " takes the second out"
+            )
         self._zero_s = stamp_of(first) or Fraction(0) if footage.kind == "camera" else Fraction(0)
         self._about = self._describe(first)
         self._light(first)  # (what cannot be read is refused now, not in the middle of a conversion)
