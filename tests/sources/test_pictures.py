@@ -247,6 +247,23 @@ def test_radiance_and_pfm_are_light_as_they_stand(tmp_path: Path, suffix: str) -
     assert source.describe()["transfer"] == "linear"
 
 
+def test_light_of_radiance_is_that_of_the_scene_whatever_the_exposure_of_each_picture(tmp_path: Path) -> None:
+    """A clip whose frames were made presentable one by one does not flicker."""
+    light = np.random.default_rng(0).uniform(1, 3, (6, 8, 3)).astype(np.float32)
+    for k, exposures in enumerate(([], ["4.0"], ["2.5e-1", " 0.5"], ["0"], ["x"])):
+        product = np.prod([float(text) for text in exposures if text not in "0x"])
+        cv2.imwrite(str(path := tmp_path / f"{k}.hdr"), light[..., ::-1] * np.float32(product))
+        head, _, rest = path.read_bytes().partition(b"\n")
+        path.write_bytes(b"\n".join([head, *(f"EXPOSURE={text}".encode() for text in exposures), rest]))
+    frames = [frame.light for frame in open_source(tmp_path, fps=1, colour="rgb").frames()]
+    for frame in frames:
+        np.testing.assert_allclose(frame, frames[0], rtol=1 / 64)
+    (tmp_path / "0.hdr").unlink()
+    as_it_stands, other, *_ = (frame.light for frame in open_source(tmp_path, fps=1, colour="rgb").frames())
+    np.testing.assert_allclose(as_it_stands, 4 * light, rtol=1 / 64)
+    np.testing.assert_allclose(other, as_it_stands, rtol=1 / 64)
+
+
 def test_a_folder_of_codes_and_light_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "0.png"), codes((4, 4)))
     cv2.imwrite(str(tmp_path / "1.tif"), np.ones((4, 4), np.float32))
@@ -258,6 +275,16 @@ def test_hidden_files_are_no_images(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "0.png"), codes((4, 4)))
     (tmp_path / "._0.png").write_bytes(b"resource fork")
     assert open_source(tmp_path, fps=1).frames_expected == 1
+
+
+@pytest.mark.parametrize(("suffix", "kind"), [
+    ("pgm", "P5"), ("pnm", "P5"), ("PNM", "P2"), ("ppm", "P6"), ("pam", "P7"), ("pbm", "P4"),
+])  # fmt: skip
+def test_netpbm_is_found_by_all_its_names(tmp_path: Path, suffix: str, kind: str) -> None:
+    values = codes((4, 8, 3) if kind == "P6" else (4, 8))
+    content = b"P4 8 4\n" + bytes(4) if kind == "P4" else pnm(kind, 255, values)
+    (tmp_path / f"0.{suffix}").write_bytes(content)
+    assert [frame.light.shape for frame in open_source(tmp_path, fps=1).frames()] == [(4, 8)]
 
 
 # ---------------------------------------------------------------------------------------------------------- names lie

@@ -25,7 +25,8 @@ from vid2ev.untrusted import check_file, png_chunks
 Kind = Literal["picture", "array", "arrays", "video"]
 
 PICTURE_SUFFIXES = (
-    ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pfm", ".webp", ".jp2", ".exr", ".hdr", ".pic",
+    ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pbm", ".pgm", ".ppm", ".pnm", ".pam", ".pfm", ".webp", ".jp2",
+    ".exr", ".hdr", ".pic",
 )  # fmt: skip
 MOTION_JPEG_SUFFIXES = (".mjpg", ".mjpeg")
 
@@ -34,7 +35,8 @@ EXR = b"\x76\x2f\x31\x01"
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff"
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-PICTURES = (EXR, PNG, JPEG, *TIFF, b"BM", b"\0\0\0\x0cjP  ", b"#?RADIANCE", b"#?RGBE")
+RADIANCE = (b"#?RADIANCE", b"#?RGBE")
+PICTURES = (EXR, PNG, JPEG, *TIFF, b"BM", b"\0\0\0\x0cjP  ", *RADIANCE)
 ANIMATED = 0x02  # a flag of WebP
 NETPBM = re.compile(rb"P[1-7Ff]\s")
 HEAD = 4096

@@ -7,7 +7,8 @@ beside it, or from fps: one after the other then, whatever their numbers, with a
 Codes are sRGB, 16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose
 folder it is, or the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs,
 and PNM and PAM say which code is white.
-Floating point is linear light, 1.0 white as it stands.  Transparency is ignored.
+Floating point is linear light, 1.0 white as it stands; of Radiance HDR as it stands in the first, and all others are
+brought to its EXPOSURE.  Transparency is ignored.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from vid2ev.formats import recognise
 from vid2ev.light.netpbm import white_in
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader, bits_of, white_of
+from vid2ev.light.radiance import exposure_in
 from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
@@ -94,7 +96,7 @@ class Images:
             self.warnings += [] if curve else remarks_on_tags(self._places[0][0], first)
             transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
-        self._white = white_in(self._places[0][0])
+        self._white, self._exposure = white_in(self._places[0][0]), exposure_in(self._places[0][0])
         self._reader = PictureReader(transfer, colour, white or self._white)
         self.warnings += self._reader.remarks_on(first)
         self._dtype = first.dtype
@@ -147,6 +149,8 @@ class Images:
                 f"{file}: white is code {white or np.iinfo(pixels.dtype).max} by its header, expected"
                 f" {self._white or 'the largest'} as in the first image; bring them to one, as in PNG"
             )
+        if pixels.dtype.kind == "f" and (exposure := exposure_in(file)) != self._exposure:
+            pixels = pixels * pixels.dtype.type(self._exposure / exposure)
         return self._reader.light(pixels, primaries)
 
     def _read_stamps(self) -> tuple[list[Fraction], str]:
