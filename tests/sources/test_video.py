@@ -287,6 +287,24 @@ def test_packed_and_semi_planar_formats_are_taken_apart_without_loss(make_pictur
             np.testing.assert_array_equal(got, expected)
 
 
+@pytest.mark.parametrize(("pixel_format", "bits"), [
+    ("rgb565le", (5, 6, 5)), ("rgb555be", (5, 5, 5)), ("rgb444le", (4, 4, 4)), ("rgb8", (3, 3, 2)),
+    ("rgb4_byte", (1, 2, 1)),
+])  # fmt: skip
+def test_white_of_few_bits_is_white(make_picture, pixel_format: str, bits: tuple[int, int, int]) -> None:
+    """Codes of 5 bits are 31sts: shifted to 8 bits, white is 248, and tinted beside the 252 of 6 bits."""
+    from vid2ev.sources.planes import planar
+
+    low = np.cumsum((0, *bits[:0:-1]))[::-1]  # where red, green and blue begin, blue at the lowest bit
+    words = np.arange(2 ** sum(bits)).reshape(-1, min(2 ** sum(bits), 64))
+    stored = words.astype({"le": "<u2", "be": ">u2"}.get(pixel_format[-2:], "u1"))
+    taken = planar(make_picture([stored], pixel_format), "clip")
+    for plane, k in zip(taken.planes, (1, 2, 0), strict=True):
+        got = np.frombuffer(plane, np.uint8).reshape(plane.height, -1)[:, : words.shape[1]]
+        most = 2 ** bits[k] - 1
+        np.testing.assert_allclose(got, (words >> low[k] & most) * (255 / most), atol=0.5)
+
+
 @pytest.mark.parametrize("pixel_format", ["y210be", "grayf32le", "bayer_rggb8"])
 def test_formats_that_cannot_be_taken_apart_are_refused(pixel_format: str) -> None:
     from vid2ev.sources.planes import planar

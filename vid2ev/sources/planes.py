@@ -15,7 +15,8 @@ from vid2ev.errors import DataError
 
 
 def planar(picture: Any, path: object) -> Any:
-    """The picture in planes of whole codes: as it is, or rearranged without loss (semi-planar, packed, big-endian)."""
+    """The picture in planes of whole codes: as it is, or rearranged without loss (semi-planar, packed, big-endian);
+    codes of red, green or blue that have fewer bits than 8 become the nearest of 8."""
     kind = picture.format
     bits = max(component.bits for component in kind.components)
     unsupported = f"{path}: pixel format {kind.name} is not supported; convert it to 8 to 16 bits of RGB or YUV"
@@ -32,9 +33,23 @@ def planar(picture: Any, path: object) -> Any:
     if kind.name.replace("yuvj", "yuv").replace("yuva", "yuv").replace("gbrap", "gbrp") == wanted:
         return picture
     try:
-        return picture.reformat(format=wanted)
+        made = picture.reformat(format=wanted)
     except OSError as error:  # (swscale cannot read it)
         raise DataError(unsupported) from error
+    if kind.is_rgb:
+        red, green, blue = (component.bits for component in kind.components[:3])
+        for plane, few in zip(made.planes, (green, blue, red), strict=True):
+            if few < 8:
+                _stretch(plane, few)
+    return made
+
+
+def _stretch(plane: Any, bits: int) -> None:
+    """Bring a plane of codes of `bits` bits to those of 8: in swscale's, steps are of whole codes, and white is less
+    than 255."""
+    step = 1 << 8 - bits if bits > 3 else 255 // (2**bits - 1)
+    codes = np.frombuffer(plane, np.uint8)
+    codes[:] = np.rint(np.arange(256) * (255 / (step * (2**bits - 1)))).clip(0, 255).astype(np.uint8)[codes]
 
 
 def orientation_of(picture: Any) -> tuple[bool, bool, bool]:
