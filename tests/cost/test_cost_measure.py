@@ -94,6 +94,7 @@ def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: P
     ahead = {row["name"] for row in (told["reference"], *told["settings"]) if row["front"]}
     assert {line[1] for line in lines[1:] if line[0]} == ahead
     assert [line[1] for line in lines if line[0] == ">"] == [told["recommended"]]
+    assert [line[1] for line in lines if "another recording" in line[-1]] == ["half the size"]
     assert recommendation(cost) == table(cost).splitlines()[-1]
     assert told["recommended"] in recommendation(cost)
     assert told["warnings"] == [] and "warning" not in table(cost)

@@ -83,7 +83,7 @@ def _aside(row: Row) -> str:
     """What is compared but not offered."""
     if row.rung.float64:
         return f"{row.rung.arguments()} (float64)".strip()
-    return f"{row.rung.arguments()} (another recording)"
+    return f"{row.rung.arguments()} (another recording)" if row.rung.group else row.rung.arguments()
 
 
 def _of_events(row: Row) -> list[str]:
