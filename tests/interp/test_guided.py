@@ -297,10 +297,14 @@ def test_motion_is_that_of_the_light_however_frames_are_coded(name: str, options
     assert by_codes.flows.abs().amax() > 1 and torch.equal(by_light.flows, by_codes.flows)
 
 
-@pytest.mark.parametrize("size", [(8, 30), (16, 16)])
+@pytest.mark.parametrize("size", [(8, 30), (15, 40), (1, 1), (16, 16)])
 def test_any_size_will_do(size: tuple[int, int]) -> None:
-    first, last = torch.rand(2, 1, 1, *size)
-    assert guided(first, last, first[:, None]).flows.shape == (1, 1, 4, *size)
+    """There is no motion in pictures that are too small for optical flow; light that moves is found in others."""
+    pattern = torch.rand(1, 1, size[0], size[1] + 2)
+    first, last = pattern[..., :-2], pattern[..., 2:]
+    flows = guided(first, last, first[:, None]).flows
+    assert flows.shape == (1, 1, 4, *size)
+    assert flows.any() == (min(size) >= 16)
 
 
 def test_a_fresh_guided_network_is_the_closed_form() -> None:
