@@ -70,7 +70,7 @@ def cost(
     **options: Any,
 ) -> None:
     """Convert a part of SOURCE with one setting after the other, and say how long each takes and how far its events are
-    from those of the finest: a table, a file for programs, and a plot of error against time.
+    from those of a reference, finer than all of them: a table, a file for programs, and a plot of error against time.
 
     What you give explicitly is the same in all settings; the rest is varied.  Nothing else is written.  Kernels are
     compiled before anything is timed; the first time that takes some minutes.
