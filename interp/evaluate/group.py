@@ -64,7 +64,6 @@ class Footage(Protocol):
     called      what folders of others' pictures of it may be called, the likeliest first
     expected    number of groups, for progress; may be an estimate
     begin       the first key frame
-    numbers     those that the names of its own pictures end in, one for each frame; none where there are none
     protocol    which frames are rebuilt
     limit       gaps that are scored, from the first on; None for all
     identity    what tells it from another, ready for JSON
@@ -74,7 +73,6 @@ class Footage(Protocol):
     called: tuple[str, ...]
     expected: int
     begin: int
-    numbers: Sequence[int]
     protocol: protocols.Protocol
     limit: int | None
     identity: dict[str, Any]
@@ -82,6 +80,10 @@ class Footage(Protocol):
     @property
     def frames(self) -> int:
         """How many it has, key frames included."""
+
+    @property
+    def numbers(self) -> Sequence[int]:
+        """Those that the names of its own pictures end in, one for each frame; none where there are none."""
 
     def groups(self) -> Iterator[Group]:
         """Its groups, in order, those that can be scored; again from the start each time."""

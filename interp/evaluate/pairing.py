@@ -124,8 +124,8 @@ def paired(
         for found in fitting.values():
             files_of = {frame: path for frame, path in zip(found.frames, files, strict=True) if frame is not None}
             return Paired(files_of, f"{len(files)} pictures {found.said}" if found.said else "")
-    if found := _of_own(gaps, numbers, own):
-        return Paired(dict(zip(found.frames, files, strict=True)), f"{len(files)} pictures {found.said}")
+    if its_own := _of_own(files, gaps, numbers, own):
+        return its_own
     if not _of_frames(gaps, numbers):
         raise _unknown(files, gaps, numbers)
     plain = protocol.insert == protocol.skip and not numbers.counted_from(0) and max(numbers.of) < frames
@@ -182,7 +182,7 @@ def _of_frames(gaps: Gaps, numbers: Numbers) -> bool:
     return {*numbers.of} <= {*gaps.within(gaps.skipped, gaps.every)}
 
 
-def _of_own(gaps: Gaps, numbers: Numbers, own: Sequence[int]) -> Reading | None:
+def _of_own(files: Sequence[Path], gaps: Gaps, numbers: Numbers, own: Sequence[int]) -> Paired | None:
     """Numbers as those of the sequence's own pictures, where these are of frames that are scored alone, and as numbers
     of frames they are not."""
     frame_of = {number: frame for frame, number in enumerate(own)}
@@ -192,8 +192,8 @@ def _of_own(gaps: Gaps, numbers: Numbers, own: Sequence[int]) -> Reading | None:
     scored = {*gaps.within([*gaps.protocol.positions], gaps.every)}
     if {*numbers.of} <= scored or not {*named} <= scored:
         return None
-    ends = f"{min(numbers.of)} to {max(numbers.of)}"
-    return Reading((*named,), f"are taken for the frames whose own pictures have the same numbers, {ends}")
+    said = f"{len(files)} pictures are taken for the frames whose own pictures have the same numbers, {_ends(numbers)}"
+    return Paired(dict(zip(named, files, strict=True)), said)
 
 
 def _own_count(gaps: Gaps, count: int) -> list[int]:
@@ -208,8 +208,11 @@ def _limited(gaps: Gaps, count: int) -> str:
 
 
 def _by_number(numbers: Numbers) -> str:
-    ends = f"{min(numbers.of)} to {max(numbers.of)}"
-    return f"are taken for the frames of the numbers that their names end in, {ends}, 0 for the first frame"
+    return f"are taken for the frames of the numbers that their names end in, {_ends(numbers)}, 0 for the first frame"
+
+
+def _ends(numbers: Numbers) -> str:
+    return f"{min(numbers.of)} to {max(numbers.of)}"
 
 
 def _of(gaps: int) -> str:
