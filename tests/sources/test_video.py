@@ -806,4 +806,6 @@ def test_real_clips_are_read_whole(shared_videos: Path, name: str, size: tuple[i
         assert abs(frame.t_ns - stamp * 10**9) <= Fraction(1, 2)
         assert frame.light.shape == size[::-1] and np.isfinite(frame.light).all()
         seen += 1
-    assert seen == count and source.warnings == []
+    assert seen == count
+    of_two = "the first of 2 video streams is read"  # (nasa_13013 has another one of 480x270)
+    assert [said[: len(of_two)] for said in source.warnings] == [of_two] * (name == "nasa_13013.mp4")
