@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 class OfSequence:
     """A sequence in a folder.
 
-    Of a recording with two frame cameras, the frames of the slower one are the key frames.
+    Of a recording with two frame cameras, the frames of the slower one are the key frames.  `late_us` is by how much
+    the clock of its events is known to be ahead of that of its frames.
     Raises UsageError where no frame lies in the part asked for.
     """
 
@@ -43,6 +44,7 @@ class OfSequence:
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
         self.dead_time = options.dead_time(sequence.dead_time)
+        self.late_us = sequence.late_us if isinstance(sequence, Own) else 0
         self.remarks = sequence.remarks
         self._times_us = sequence.slow_us if isinstance(sequence, Own) else sequence.times_us
         self._picture = sequence.slow if isinstance(sequence, Own) else sequence.frame

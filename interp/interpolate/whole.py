@@ -267,11 +267,18 @@ def _are_even(gaps_us: list[int]) -> bool:
 
 
 def _brought(ready: Ready) -> list[str]:
-    """That events are brought to the frames, if they are asked for and their camera stands elsewhere."""
-    wanted = ready.fill.events or ready.fill.method.needs_events
-    if not (wanted and isinstance(ready.take, OfSequence) and ready.take.apart):
+    """What becomes of events, if they are asked for, whose camera stands elsewhere or has another clock."""
+    take, wanted = ready.take, ready.fill.events or ready.fill.method.needs_events
+    if not (wanted and isinstance(take, OfSequence)):
         return []
-    return ["its cameras stand apart: events are brought to where the frames saw the same change"]
+    said = ["its cameras stand apart: events are brought to where the frames saw the same change"] * take.apart
+    if take.late_us:
+        late = f"{abs(take.late_us)} us {'late' if take.late_us > 0 else 'early'}"
+        said.append(
+            f"its events are {late} by the clock of its frames, which is not corrected; give both cameras of the rig"
+            " one clock_offset_us"
+        )
+    return said
 
 
 def _clipped(shelf: Shelf, ready: Ready) -> list[str]:

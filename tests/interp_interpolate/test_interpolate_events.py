@@ -502,6 +502,25 @@ def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_pat
     assert not any("stand apart" in remark for remark in told["remarks"])  # (it asks for no events)
 
 
+@pytest.mark.parametrize(("dvs_us", "cis_us"), [(0, 0), (700, 700), (1500, 0), (-200, 100)])
+def test_events_by_a_clock_that_is_known_to_be_late_are_said_to_be(tmp_path: Path, dvs_us: int, cis_us: int) -> None:
+    """In a rig; of cameras of one clock nothing is said, and nothing where no events are asked for."""
+    rig = tmp_path / "rig.toml"
+    cameras = (("dvs", dvs_us), ("cis", cis_us))
+    rig.write_text("".join(f'[[camera]]\nname = "{k}"\nkind = "{k}"\nclock_offset_us = {us}\n' for k, us in cameras))
+    convert(
+        images(tmp_path / "in", moving(5)), tmp_path / "made", rig=rig, pictures="png", preview=False, threads=1,
+        cis="ideal", overrides=["cis.frame_rate_hz=15"],
+    )  # fmt: skip
+    said = {
+        method: " ".join(interpolate(tmp_path / "made", tmp_path / method, multiple=2, method=method)["remarks"])
+        for method in ("bridge", "flow")
+    }
+    late_us = dvs_us - cis_us
+    expected = f"{abs(late_us)} us {'late' if late_us > 0 else 'early'} by the clock of its frames"
+    assert (expected in said["bridge"]) == ("clock" in said["bridge"]) == bool(late_us) and "clock" not in said["flow"]
+
+
 def test_events_are_looked_for_where_a_map_of_that_instant_says(tmp_path: Path) -> None:
     """A camera beside a scene whose depth is known; without the maps, as if it were far away."""
     rig = tmp_path / "rig.toml"

@@ -33,6 +33,12 @@ class Calibration:
             placed = [_sight(self._cameras[name]) for name in (one, other) if name in self._cameras]
             return len(placed) == 2 and not np.allclose(placed[0], placed[1], atol=1e-6)
 
+    def late_us(self, one: str, other: str) -> int:
+        """By how much the clock of the second of two cameras is ahead of that of the first [us]."""
+        with as_stated(self._manifest):
+            first, second = (int(self._cameras.get(name, {}).get("clock_offset_us", 0)) for name in (one, other))
+            return second - first
+
     def look(self, one: str, size: tuple[int, int], other: str) -> Look | None:
         """Where pixels of a camera with pictures of a size (width, height) look in another; None of cameras that are
         not those of a rig.

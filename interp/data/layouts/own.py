@@ -36,6 +36,7 @@ class Own:
     keys_folder     the pictures of the slow frame camera
     grey            whether these have no colours
     events_folder   what the event camera wrote
+    late_us         by how much its clock is ahead of that of the slow frame camera
     Where there are no pictures of 8 bits (`--cis-out png`), they are made of the codes of the ADC, as those would be.
     Of frame cameras whose pictures have different curves (`cis.gamma`) both are brought to that of the slow one.
     Raises DataError for a recording that has no events or no frames, or whose events cannot be read.
@@ -70,7 +71,7 @@ class Own:
         self.size, self.grey = self._frames.codes(0).shape[1::-1], self._keys.codes(0).ndim == 2
         self.event_size = tuple(sent["size"])
         self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
-        self.apart = beside[sent["name"]]
+        self.apart, self.late_us = beside[sent["name"]], calibration.late_us(keys["name"], sent["name"])
         self._calibrated = calibration.look(keys["name"], self.size, sent["name"]) if self.apart else None
         self._maps = Maps(self.keys_folder.parent / TRUTH, sent["name"], self.size)
         self._span_us = sent["span_us"]
