@@ -28,7 +28,8 @@ class FramesBesideEvents(OfSource):
     """A video or a folder of images, and the events of a file; both on one clock.
 
     Events of as many pixels as the frames have before `--crop` and `--size` are cropped with these.  Of events of
-    another resolution nobody says where they belong: that is found (`interp.candidates.registered`).
+    another resolution nobody says where they belong: that is found (`interp.candidates.registered`), from edge on edge
+    with what is left of the frames.
     """
 
     def __init__(self, path: str, options: Options, events: Path):
@@ -43,6 +44,7 @@ class FramesBesideEvents(OfSource):
         self._cropped = sent != self.size and sent == self._whole != (width, height)
         self.event_size: tuple[int, int] = (width, height) if self._cropped else sent
         self.apart = self.event_size != self.size
+        self._laid_over_part = self.apart and not self._cropped and self._whole != (width, height)
 
     @property
     def remarks(self) -> list[str]:
@@ -50,10 +52,12 @@ class FramesBesideEvents(OfSource):
         across, down = self._whole if self._cropped else self.event_size
         guessed = f"{self._events_path} does not state the size of its sensor, taken for {across}x{down}"
         cropped = f"{self._events_path} is of as many pixels as whole frames, and is cropped as these are"
+        laid = f"{self._events_path} is of other pixels than whole frames, and all of it is laid over the part of these"
         said = [*super().remarks, *(f"{self._events_path}: {text}" for text in self._cursor.file.warnings)]
         if not self._cursor.count:
             return [*said, f"{self._events_path} holds no events"]
-        return [*said, *[guessed] * self._guessed, *[cropped] * self._cropped, *self._elsewhere()]
+        said += [guessed] * self._guessed + [cropped] * self._cropped + [laid] * self._laid_over_part
+        return [*said, *self._elsewhere()]
 
     def _elsewhere(self) -> Iterator[str]:
         """Whether all events are before the frames, or after them."""

@@ -136,6 +136,22 @@ def test_a_sensor_of_unknown_size_is_that_of_the_frames_if_all_events_are_within
     assert take.event_size == (100, 11) and any("taken for 100x11" in text for text in take.remarks)
 
 
+@pytest.mark.parametrize("size", [None, "20", "20x16!"])
+@pytest.mark.parametrize("crop", [None, "40x32+12+5"])
+def test_coarse_events_that_are_laid_over_a_part_of_the_frames_are_said_to_be(
+    tmp_path: Path, crop: str | None, size: str | None
+) -> None:
+    """Of a film of that part, as it is, nothing is said."""
+    events, whole = drawn(), images(tmp_path / "whole", moving(3))
+    part = images(tmp_path / "part", [frame[5:37, 12:52] if crop else frame for frame in moving(3)])
+    path = tmp_path / "coarse.npz"
+    np.savez(path, t=events.t, x=events.x // 4, y=events.y // 4, p=events.p, size=(16, 12))
+    one = open_take(whole, Options(events=path, crop=crop, size=size))
+    other = open_take(part, Options(events=path, size=size))
+    assert [any("laid over" in text for text in take.remarks) for take in (one, other)] == [bool(crop), False]
+    assert one.event_size == other.event_size == (16, 12) and one.apart
+
+
 @pytest.mark.parametrize("says_its_size", [True, False])
 def test_events_of_whole_frames_are_cropped_as_these_are(tmp_path: Path, says_its_size: bool) -> None:
     """What frames and events are that somebody else has cropped."""
