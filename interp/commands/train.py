@@ -43,11 +43,12 @@ SAYS = {  # what an option says of a job: the part of it, if it is in one, and t
 )  # fmt: skip
 @click.option(
     "--data", multiple=True, metavar="PATH", type=click.Path(exists=True),
-    help="A video, or a folder of recordings; may be repeated.  [default: scenes, made on the fly]",
+    help="A video, or a folder of recordings, of videos or of pictures with their times; may be repeated.  [default:"
+    " scenes, made on the fly]",
 )  # fmt: skip
 @click.option(
-    "--validate", multiple=True, metavar="VIDEO", type=click.Path(exists=True, dir_okay=False),
-    help="A video to validate with, beside scenes: frames of it are left out.",
+    "--validate", multiple=True, metavar="VIDEO", type=click.Path(exists=True),
+    help="A video to validate with, or a folder as of --data, beside scenes: frames of it are left out.",
 )  # fmt: skip
 @click.option("-o", "--output", metavar="RUN", help="Folder of the run.  [default: NETWORK_SIZE here]")
 @click.option("--time", "time_", metavar="TIME", help="How long it may take, such as 2h.  [default: 55m]")
@@ -204,15 +205,31 @@ def _job(options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
     """The job of options of the command line."""
     from interp.train.job import Job
 
-    paths = options["data"]
-    videos = [path for path in paths if Path(path).is_file()]
+    videos, recordings = _told_apart(options["data"])
+    validated, others = _told_apart(options["validate"])
+    if others:
+        raise UsageError(f"--validate {others[0]}: expected a video, or a folder of videos or of pictures")
     settings = [f"seed={options['seed']}", *options["settings"]]
     if options["time_"]:
         settings.append(f"time_s={_seconds(options['time_'], '--time')}")
     if options["steps"]:
         settings.append(f"steps={options['steps']}")
-    recordings = [path for path in paths if path not in videos]
-    return Job.of(options["network"], options["size"], settings, videos, recordings, options["validate"], starts)
+    return Job.of(options["network"], options["size"], settings, videos, recordings, validated, starts)
+
+
+def _told_apart(paths: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The videos that paths stand for, and the folders of recordings among them, or of neither."""
+    from interp.data.layouts import holds_sequences
+    from vid2ev.sources.many import holds_pictures, sources_in
+
+    videos, recordings = list[str](), list[str]()
+    for path in paths:
+        found = [] if Path(path).is_dir() and holds_sequences(path) else sources_in(path)
+        if found == [path] and Path(path).is_dir() and not holds_pictures(Path(path)):
+            found = []
+        videos += found
+        recordings += [] if found else [path]
+    return videos, recordings
 
 
 def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:

@@ -339,6 +339,33 @@ def test_recordings_that_give_no_clips_are_named_before_training(tmp_path: Path)
     assert shown.exit_code == 2 and "40x24 are smaller than clips, 128x128; give --set clips.size" in shown.output
 
 
+def test_a_folder_of_videos_or_of_pictures_is_as_these_by_themselves(tmp_path: Path) -> None:
+    light = np.random.default_rng(0).uniform(size=(20, 24, 40, 3)).astype(np.float32)
+    for name in ("films/a.npz", "films/b.npz"):
+        Path(name).parent.mkdir(exist_ok=True)
+        np.savez(tmp_path / name, frames=light, fps=30)
+    Path("frames").mkdir()
+    for k in range(20):
+        write_codes(Path("frames", f"{k:03d}.png"), np.rint(255 * light[k]).astype(np.uint8))
+    Path("frames", "timestamps.txt").write_text("".join(f"{33_333 * k}\n" for k in range(20)))
+    write_hsergb(tmp_path / "recordings" / "seq", 9)
+    Path("nothing").mkdir()
+    small = ("--dry-run", "--json", "--set", "clips.size=[32,24]", "--set", "samples.size=16")
+    films, frames = [str(Path("films", name)) for name in ("a.npz", "b.npz")], "frames"
+    for asked, videos in (("films", films), (frames, [frames]), (films[1], [films[1]]), ("recordings", [])):
+        found = run(*small, "--data", asked)
+        assert found.exit_code == 0, found.output
+        of = json.loads(found.output)["clips"]
+        assert of["video_files"] == videos and of["videos"] == len(videos)
+        assert of["recording_folders"] == ([] if videos else [asked])
+        if videos:
+            assert json.loads(run(*small, "--validate", asked).output)["validation"]["videos"] == videos
+    assert "nothing: no recordings in it" in run(*small, "--data", "nothing").output
+    for asked in ("nothing", "recordings"):
+        refused = run(*small, "--validate", asked)
+        assert refused.exit_code == 2 and f"--validate {asked}: expected a video, or a folder of v" in refused.output
+
+
 def test_a_film_that_is_too_small_is_refused_before_training(tmp_path: Path) -> None:
     np.savez(tmp_path / "film.npz", frames=np.zeros((20, 24, 40, 3), np.float32), fps=30)
     shown = run("--data", "film.npz", "--dry-run")

@@ -16,6 +16,7 @@ __all__ = [
     "Placed",
     "Sequence",
     "Windows",
+    "holds_sequences",
     "is_sequence",
     "open_sequence",
     "opened_in",
@@ -40,6 +41,11 @@ def open_sequence(folder: str | Path) -> Sequence:
 def is_sequence(folder: str | Path) -> bool:
     """Whether a path is a folder in one of the layouts, by what is in it."""
     return _kind(Path(folder)) is not None
+
+
+def holds_sequences(folder: str | Path) -> bool:
+    """Whether there are some in a folder or below it, as far as can be told without opening them."""
+    return bool(_below(Path(folder), DEEPEST))
 
 
 def sequences_in(folder: str | Path) -> tuple[list[Path], dict[str, str]]:
