@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -275,6 +276,28 @@ def test_hidden_files_are_no_images(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "0.png"), codes((4, 4)))
     (tmp_path / "._0.png").write_bytes(b"resource fork")
     assert open_source(tmp_path, fps=1).frames_expected == 1
+
+
+@pytest.mark.parametrize(("bits", "stored", "masks", "read"), [
+    (24, 0, (), True),
+    (32, 0, (), True),
+    (32, 3, (0xFF0000, 0xFF00, 0xFF), True),
+    (32, 3, (0xFF000000, 0xFF0000, 0xFF00), False),
+    (16, 0, (), False),  # 5 bits of each
+    (16, 3, (0xF800, 0x7E0, 0x1F), False),
+])  # fmt: skip
+def test_no_layout_of_a_bmp_is_read_for_another(tmp_path: Path, bits: int, stored: int, masks, read: bool) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (4, 8, bits // 8), np.uint8)  # (rows of whole 4 bytes)
+    where = struct.pack(f"<{len(masks)}I", *masks)
+    head = struct.pack("<IiiHHIIiiII", 40, 8, -4, 1, bits, stored, pixels.nbytes, 2835, 2835, 0, 0) + where
+    begin = 14 + len(head)
+    path = tmp_path / "a.bmp"
+    path.write_bytes(b"BM" + struct.pack("<IHHI", begin + pixels.nbytes, 0, 0, begin) + head + pixels.tobytes())
+    if read:
+        np.testing.assert_array_equal(read_picture(path).pixels, pixels[..., 2::-1])
+    else:
+        with pytest.raises(DataError, match=rf"a\.bmp: a BMP of {bits} bits a pixel .* with 24 bits"):
+            read_picture(path)
 
 
 @pytest.mark.parametrize(("suffix", "kind"), [

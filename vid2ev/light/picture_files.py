@@ -18,12 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.light.bmp import check_bmp
 from vid2ev.light.icc import profile_name, remarks_on_profile
 from vid2ev.light.netpbm import PAM, TEXT, plain_pnm
 from vid2ev.light.pictures import TYPES
 from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
-from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
+from vid2ev.light.recognise import BMP, EXR, PNG, TIFF, head_of
 from vid2ev.light.tiff_tags import check_tiff
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr, plain_name
 
@@ -133,8 +134,11 @@ def _read(path: Path, page: int, count: int = 1) -> list[np.ndarray]:
     """Pictures from a page on, as many as there are up to `count`.  Raises DataError if there is none."""
     import cv2
 
-    if head_of(path).startswith(TIFF):
+    head = head_of(path)
+    if head.startswith(TIFF):
         check_tiff(path)
+    elif head.startswith(BMP):
+        check_bmp(path)
     found = decoded(path, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page, count)
     if not found:
         raise DataError(f"{path}: not an image that can be read; remove it or write it anew")
