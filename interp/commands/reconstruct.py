@@ -34,7 +34,7 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
 )  # fmt: skip
 @click.option(
     "--cutoff", "cutoff_hz", type=Finite(), metavar="HZ",
-    help="A high-pass filter in place of a network: what changes more slowly fades to grey.  [default: 1]",
+    help="A high-pass filter in place of a network: what changes more slowly fades to grey.",
 )  # fmt: skip
 @click.option("--fps", metavar="RATE", help="Pictures per second of the scene's time.  [default: 30]")
 @click.option(
