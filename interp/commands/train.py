@@ -119,6 +119,7 @@ def train(
     films = job.validation.videos
     notes = [f"not used: {reason}" for reason in unusable(job.clips, films)] + trained_with(job.clips, films)
     _note(notes, machines, quiet)
+    device = _device(clips_on, machines, quiet)
     if dry_run:
         from interp.train.made_of import learner_of
         from interp.train.run_folder import check_place
@@ -131,7 +132,6 @@ def train(
         return
     if resume and machines.first and (changed := with_others(path)):
         _note([f"trained until now with {changed}: it goes on, but not to the same bits"], machines, quiet)
-    device = _device(clips_on, machines, quiet)
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts, device)
     if machines.first:
         _tell(outcome, path, job.network, as_json, quiet)

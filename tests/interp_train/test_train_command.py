@@ -137,6 +137,8 @@ def test_clips_are_made_on_the_cpu_where_there_is_no_gpu(monkeypatch: pytest.Mon
     done = run(*FEW, "-o", "run", "--clips-on", "cuda")
     assert done.exit_code == 0, done.output
     assert done.output.startswith("note: clips are made on the CPU: torch sees no GPU\nrun: step 3 of 3\n")
+    dry = run("--dry-run", "--clips-on", "cuda")
+    assert dry.exit_code == 0 and dry.output.startswith("note: clips are made on the CPU: torch sees no GPU\nnetwork ")
     quiet = run(*FEW, "-o", "other", "--clips-on", "cuda", "--quiet")
     assert quiet.exit_code == 0 and quiet.output == ""
 
