@@ -16,6 +16,8 @@ from moving_texture import texture
 
 from vid2ev import Dvs, Frame, events_of, load_sensor
 from vid2ev.compare.comparison import compare
+from vid2ev.cost.errors import Errors
+from vid2ev.cost.front import Budget
 from vid2ev.cost.measure import Cost, measured
 from vid2ev.cost.passes import Float64Dvs, run
 from vid2ev.cost.plot import plot
@@ -102,6 +104,15 @@ def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: P
     assert warned.describe()["warnings"] == ["truncated"] and "\nwarning: truncated\n" in table(warned)
     plot(cost, tmp_path / "cost.png")
     assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_setting_that_was_found_where_nothing_happens_says_so(cost: Cost) -> None:
+    silent = replace(cost, reference=replace(cost.reference, events=0))
+    assert "--start S tries another" in recommendation(silent) and "--start" not in recommendation(cost)
+    of_frames = {"errors": Errors(rms_lsb=0.0), "events": 0}
+    rows = tuple(replace(row, **of_frames) for row in cost.rows)
+    alone = replace(cost, reference=replace(cost.reference, **of_frames), rows=rows, budget=Budget.parse("lsb=1"))
+    assert recommendation(alone).endswith("0 LSB")
 
 
 def test_each_pass_is_told_of_in_advance(clip: str) -> None:

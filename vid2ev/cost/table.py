@@ -9,6 +9,8 @@ from vid2ev.cost.measure import Cost
 from vid2ev.cost.quality import Quality
 from vid2ev.cost.stretch import Stretch
 
+SILENT = "nothing happens in the part of the clip that was tried, vid2ev cost --start S tries another"
+
 
 def table(cost: Cost, *, recommending: bool = True) -> str:
     """The table, what makes light between the frames best, and the recommendation, if it is wanted."""
@@ -26,7 +28,9 @@ def recommendation(cost: Cost) -> str:
     if best is None:
         return refusal(cost.settings, cost.budget)
     asked = best.rung.arguments() or "nothing to set"
-    return f"within {cost.budget.text}: {best.rung.name} ({asked}), {best.time:.2g} x the length{_errors(best)}"
+    silent = cost.reference.events == 0 and best.errors.distance is not None
+    doubt = f"; of no events, which says little: {SILENT}" * silent
+    return f"within {cost.budget.text}: {best.rung.name} ({asked}), {best.time:.2g} x the length{_errors(best)}{doubt}"
 
 
 def cells(cost: Cost) -> list[list[str]]:
