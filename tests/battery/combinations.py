@@ -1,14 +1,14 @@
 """Combinations of what a sensor can be: options, timings, types of light, with as few kernels compiled as can be.
 
-An axis is a choice; a combination takes one of each.  There are millions, and 8 928 kernels among them (four times as
+An axis is a choice; a combination takes one of each.  There are millions, and 1 038 kernels among them (four times as
 many with the types of light), each of which takes seconds to compile.  So:
 
     everyday()     kernels that other tests compile as well, crossed in pairs with all that needs no other kernel
     covering(2)    every pair of choices of any two axes, in some combination; covering(3): every three
     share(k, n)    of the whole product, every n-th combination of a fixed shuffle, beginning with the k-th
 
-The everyday ones are in the normal suite, covering(2) is in the slow one.  The whole product, in as many shares as
-one likes, is
+The everyday ones are in the long suite, covering(2) is in the slow one.  The whole product, in as many shares as one
+likes, is
 
     VID2EV_SHARE=1/1000 python -m pytest tests/battery -m slow
 """
