@@ -25,7 +25,7 @@ def card_text(facts: dict[str, Any]) -> str:
     """The card of a data set's facts, in Markdown."""
     spec, videos = facts["spec"], facts["spec"]["videos"]
     rows = {
-        "Source": f"{_used(facts)}, {spec['slowdown']:g} times slower than the world" if videos else "simulator",
+        "Source": f"{_used(facts)}, {_pace(spec['slowdown'])}" if videos else "simulator",
         "Scenes": facts["scenes"],
         "CIS fps": f"{facts['cis_fps']:g}",
         "Interpolated fps": f"{facts['interpolated_fps']:g}",
@@ -55,6 +55,10 @@ def sensors_of(spec: dict[str, Any]) -> str:
     if spec["preset"] == "paper":
         return "those of the paper"
     return f"drawn anew for every {'video' if spec['videos'] else 'scene'}"
+
+
+def _pace(slowdown: float) -> str:
+    return "as fast as the world" if slowdown == 1 else f"{slowdown:g} times slower than the world"
 
 
 def _keys(facts: dict[str, Any]) -> str:

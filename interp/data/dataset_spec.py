@@ -126,7 +126,8 @@ def _of_videos(spec: DatasetSpec) -> tuple[list[Scene], dict[str, str]]:
     if not found:
         raise next(iter(refused.values()))
     wanted = min(spec.count or len(found), len(found))
-    return [found[k * len(found) // wanted] for k in range(wanted)], {video: str(why) for video, why in refused.items()}
+    reasons = {video: str(why).removeprefix(f"{video}: ") for video, why in refused.items()}
+    return [found[k * len(found) // wanted] for k in range(wanted)], reasons
 
 
 def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
