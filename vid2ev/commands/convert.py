@@ -176,8 +176,9 @@ def convert(
     """Turn each VIDEO into the recording of an event camera.
 
     VIDEO is a video file, a folder of images (with timestamps.txt, or --fps), a .npy or .npz array, a photograph (with
-    --motion), - for standard input, camera:0, scene:NAME (`vid2ev scene list`) or a scene file, synthetic:NAME, a folder
-    of videos, or a list of videos, NAME.txt.  A recording is a folder with events.h5, preview.mp4 and manifest.json.
+    --motion), - for standard input, camera:0, scene:NAME (`vid2ev scene list`) or a scene file, synthetic:NAME, a
+    folder of videos, or a list of videos, NAME.txt.  A recording is a folder with events.h5, preview.mp4 and
+    manifest.json.
 
     Of several videos, one that fails does not stop the others; with --resume, those that are done are left as they are.
     """
