@@ -7,6 +7,7 @@ import pytest
 import torch
 from pairs import FRAME_FED, counts, frames
 
+from interp.blocks.unet import Layout, Unet, rrin_layout, slomo_layout
 from interp.candidates.ramps import ramps
 from interp.light import grey
 from interp.networks import make
@@ -280,6 +281,18 @@ def test_images_are_not_clipped() -> None:
     with torch.no_grad():
         made.get_submodule("residue.head").bias.fill_(2.0)  # type: ignore[union-attr]
     assert made(*frames(), TIMES).images.min() > 1.5
+
+
+@pytest.mark.parametrize("layout", [rrin_layout(3, 4), slomo_layout(2)])
+def test_heads_make_either_sign_alike(layout: Layout) -> None:
+    """Motion to the left is as large as motion to the right: nothing bends what a head makes."""
+    unet = Unet(2, 4, layout)
+    seen = torch.rand(1, 2, 64, 64)
+    with torch.no_grad():
+        one = unet(seen)
+        for of in unet.head.parameters():
+            of.neg_()
+        torch.testing.assert_close(unet(seen), -one)
 
 
 @pytest.mark.parametrize(
