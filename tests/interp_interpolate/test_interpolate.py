@@ -417,41 +417,44 @@ def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tm
     assert interpolate(recording(tmp_path / "r", moving(3), step_us=hour_us), tmp_path / "rec")["frames"] == 17
 
 
+def exr_files(folder: Path, light: np.ndarray) -> Path:
+    """A folder of pictures of light [N, H, W, 3], 40 ms apart."""
+    pytest.importorskip("OpenEXR")
+    from vid2ev.scenes.picture_writing import writer_of
+
+    folder.mkdir()
+    for k, each in enumerate(light):
+        writer_of("exr")[0](each, folder / f"{k}.exr")
+    (folder / "timestamps.txt").write_text("".join(["# us\n", *(f"{40_000 * k}\n" for k in range(len(light)))]))
+    return folder
+
+
+def hdr_of_frames(file: Path) -> None:
+    """Weights that change any light, and need no events."""
+    network = make("hdr", second="frames")
+    torch.nn.init.normal_(network.out.weight, std=0.05)
+    save(file, "hdr", network)
+
+
 @pytest.mark.parametrize("given", [{"method": "linear"}, {"method": "flow"}, {"network": "rrin_light-tiny"}])
 def test_a_lamp_of_infinite_light_is_as_bright_as_one_of_the_most_that_half_floats_hold(
     tmp_path: Path, given: dict[str, Any]
 ) -> None:
-    pytest.importorskip("OpenEXR")
-    from vid2ev.scenes.picture_writing import writer_of
-
     made = []
     for lamp in (np.inf, 65504.0):
-        folder = tmp_path / str(lamp)
-        folder.mkdir()
-        for k, frame in enumerate(moving(2)):
-            light = frame.astype(np.float32) / 255
-            light[10:20, 10:20] = lamp
-            writer_of("exr")[0](light, folder / f"{k}.exr")
-        (folder / "timestamps.txt").write_text("# us\n0\n40000\n")
-        made.append([frame.codes for frame in frames(folder, multiple=2, **given)])
+        light = np.stack(moving(2)).astype(np.float32) / 255
+        light[:, 10:20, 10:20] = lamp
+        made.append([frame.codes for frame in frames(exr_files(tmp_path / str(lamp), light), multiple=2, **given)])
     np.testing.assert_array_equal(made[0], made[1])
     assert min(float(frame[14, 14].min()) for frame in made[0]) > 50
 
 
 @pytest.mark.parametrize("hdr", [False, True])
 def test_light_of_key_frames_is_the_files_own_to_the_bit(tmp_path: Path, hdr: bool) -> None:
-    pytest.importorskip("OpenEXR")
-    from vid2ev.scenes.picture_writing import writer_of
-
     light = np.random.default_rng(3).lognormal(-1, 3, (3, 24, 32, 3)).astype(np.float32)
     light[0, 0, 0] = -0.01, 0, 65504
-    (tmp_path / "in").mkdir()
-    for k, each in enumerate(light):
-        writer_of("exr")[0](each, tmp_path / "in" / f"{k}.exr")
-    (tmp_path / "in" / "timestamps.txt").write_text("# us\n0\n40000\n80000\n")
-    network = make("hdr", second="frames")
-    torch.nn.init.normal_(network.out.weight, std=0.05)
-    save(tmp_path / "hdr.safetensors", "hdr", network)
+    exr_files(tmp_path / "in", light)
+    hdr_of_frames(tmp_path / "hdr.safetensors")
     after: dict[str, Any] = {"hdr": tmp_path / "hdr.safetensors"} if hdr else {}
     interpolate(tmp_path / "in", tmp_path / "out", multiple=2, method="linear", format="exr", cuts="keep", **after)
     written = open_source(tmp_path / "out", colour="rgb").frames()
@@ -510,18 +513,10 @@ def test_that_light_above_white_is_lost_is_said_where_there_may_be_some_and_it_i
 
 
 def test_hdr_makes_no_light_above_white_darker(tmp_path: Path) -> None:
-    pytest.importorskip("OpenEXR")
-    from vid2ev.scenes.picture_writing import writer_of
-
     light = np.stack([frame.astype(np.float32) / 255 for frame in moving(3)])
     light[:, 10:20, 10:20], light[1:, 30:40, 10:20] = 30, 3
-    (tmp_path / "in").mkdir()
-    for k, each in enumerate(light):
-        writer_of("exr")[0](each, tmp_path / "in" / f"{k}.exr")
-    (tmp_path / "in" / "timestamps.txt").write_text("# us\n0\n40000\n80000\n")
-    network = make("hdr", second="frames")
-    torch.nn.init.normal_(network.out.weight, std=0.05)
-    save(tmp_path / "hdr.safetensors", "hdr", network)
+    exr_files(tmp_path / "in", light)
+    hdr_of_frames(tmp_path / "hdr.safetensors")
     given: dict[str, Any] = {"multiple": 2, "method": "linear"}
     made, plain = (
         np.stack([frame.codes for frame in frames(tmp_path / "in", **given, hdr=hdr)])
