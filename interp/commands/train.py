@@ -219,17 +219,21 @@ def _job(options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
 
 def _told_apart(paths: Sequence[str]) -> tuple[list[str], list[str]]:
     """The videos that paths stand for, and the folders of recordings among them, or of neither."""
+    found = {path: _videos_in(path) for path in paths}
+    return [video for path in paths for video in found[path]], [path for path in paths if not found[path]]
+
+
+def _videos_in(path: str) -> list[str]:
+    """The videos that a path stands for; none of a folder of recordings, or of neither."""
     from interp.data.layouts import holds_sequences
     from vid2ev.sources.many import holds_pictures, sources_in
 
-    videos, recordings = list[str](), list[str]()
-    for path in paths:
-        found = [] if Path(path).is_dir() and holds_sequences(path) else sources_in(path)
-        if found == [path] and Path(path).is_dir() and not holds_pictures(Path(path)):
-            found = []
-        videos += found
-        recordings += [] if found else [path]
-    return videos, recordings
+    folder = Path(path)
+    if not folder.is_dir():
+        return sources_in(path)
+    if holds_sequences(folder):
+        return []
+    return [each for each in sources_in(path) if each != path or holds_pictures(folder)]
 
 
 def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
