@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import torch
 
+from interp.networks import NETWORKS
+from interp.networks.frame_fed import FrameFed
 from interp.representation.event_counts import EventCounts
 from vid2ev import Events
 
-FRAME_FED = (
-    "superslomo",
-    "slomo_events",
-    "rrin",
-    "rrin_events",
-    "rrin_events_light",
-    "rrin_events_guided",
-    "rrin_slomo_events",
-    "timelens",
+FRAME_FED = tuple(
+    name
+    for name, entry in NETWORKS.items()
+    if issubclass(getattr(import_module(f"interp.networks.{entry.module}"), entry.network), FrameFed)
 )
 
 

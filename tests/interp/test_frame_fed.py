@@ -19,6 +19,7 @@ from vid2ev import Events, UsageError
 
 TIMES = [0.25, 0.5, 0.9]
 FROM_CANDIDATES = ("rrin_events_light", "rrin_events_guided")
+FROM_MOTION = ("rrin_light", "rrin_events_guided")  # (by DIS, in the place of a network of their own)
 
 
 def shaken(network: FrameFed, scale: float = 0.02) -> FrameFed:
@@ -69,7 +70,9 @@ def test_frames_go_on_as_their_border_and_events_end() -> None:
     assert float(pair.events.off_on.sum()) == 2 * 3 * 5 * 20
 
 
-@pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in (*FROM_CANDIDATES, "timelens")])
+@pytest.mark.parametrize(
+    "name", [name for name in FRAME_FED if name not in (*FROM_CANDIDATES, *FROM_MOTION, "timelens")]
+)
 def test_a_fresh_network_is_a_cross_fade_at_any_size(name: str) -> None:
     # so nothing is resampled, shifted or mixed with what was put around
     first, second = frames(2, (19, 35))
@@ -104,7 +107,7 @@ def test_targets_may_come_in_any_number_and_order(name: str) -> None:
     torch.testing.assert_close(own.images[1].flip(0), together.images[1], rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in ("timelens", "rrin_events_guided")])
+@pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in (*FROM_MOTION, "timelens")])
 def test_the_first_flow_network_runs_once_per_pair(name: str) -> None:
     made = network(name)
     runs = []
@@ -179,7 +182,8 @@ def test_events_matter_where_a_network_takes_them_and_only_there(name: str, opti
     with torch.no_grad():
         with_them, without = (made(first, second, TIMES, some).images for some in (counts(rate=1.0), counts(rate=0.0)))
     assert torch.equal(with_them, without) == (not made.spec.takes_events)
-    assert made.spec.takes_events == (name not in ("superslomo", "rrin") and options.get("flow") != "dis")
+    of_frames = name in ("superslomo", "rrin", "rrin_light") or options.get("flow") == "dis"
+    assert made.spec.takes_events == (not of_frames)
 
 
 @pytest.mark.parametrize("candidate", ["base", "mixed", "softmax"])
