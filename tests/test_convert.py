@@ -16,10 +16,13 @@ import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, events_of, load_sensor, open_source, read_events
 from vid2ev.formats import open_events
-from vid2ev.making.conversion import Paused
+from vid2ev.making.conversion import Paused, job_of
+from vid2ev.rig.camera import Camera, Rig
 from vid2ev.seen import instants
 from vid2ev.seen.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
+from vid2ev.seen.recipe import Recipe
 from vid2ev.stream.ahead import ahead
+from vid2ev.tracks.outputs import Outputs
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
 NOISY = ["shot_rate_hz=20", "leak_rate_hz=1", "hot_probability=0.01", "hot_rate_hz=200"]
@@ -110,6 +113,47 @@ def test_what_is_counted_goes_on_where_a_conversion_was_paused(tmp_path: Path) -
 def test_what_counts_makes_other_events(reference: Path, tmp_path: Path, changed: dict[str, Any]) -> None:
     convert(CLIP, tmp_path / "out", **(OPTIONS | changed))
     assert (tmp_path / "out" / "events.h5").read_bytes() != (reference / "events.h5").read_bytes()
+
+
+STACK: dict[str, Any] = {"video": "stack.npy", "transfer": "srgb", "fps": 30}
+BESIDE = Rig(cameras=(Camera(name="dvs", kind="dvs", translation_mm=(50.0, 0.0, 0.0)),))
+OTHER: dict[str, tuple[dict[str, Any], Any]] = {  # of each option what goes with it, and another value
+    "video": ({}, "other.npy"), "transfer": ({}, "linear"), "fps": ({}, 31), "slowdown": ({}, 2.0),
+    "start": ({}, 0.02), "stop": ({}, 0.05), "crop": ({}, "16x12+1+2"), "size": ({}, "16x12"),
+    "motion": ({"video": "photo.png", "fps": None, "size": "8x6", "motion": "pan"}, "saccade"),
+    "sensor": ({}, "ideal"), "overrides": ({}, ["threshold_on=0.2"]), "cis": ({"frame_camera": True}, "phone"),
+    "frame_camera": ({}, True), "rig": ({"depth": "plane:2", "rig": BESIDE}, BESIDE.with_frames()),
+    "depth": ({"depth": "plane:2", "rig": BESIDE}, "plane:3"), "bayer": ({}, "RGGB"),
+    "truth": ({}, "poses"), "truth_rate_hz": ({"truth": "poses"}, 20.0),
+    "upsample": ({}, "linear"), "subframes": ({}, 2), "max_subframes": ({}, 8), "cuts": ({}, "keep"),
+    "seed": ({}, 5), "labels": ({}, True),
+    "formats": ({}, "npz"), "preview": ({}, False), "frames": ({}, "npz"),
+    "frames_by": ({"frames": "npz"}, "count:50"), "frames_as": ({"frames": "npz"}, "frame:2"),
+    "probe": ({}, ["1,2"]), "noise_maps": ({}, True), "pictures": ({"frame_camera": True}, "png"),
+}  # fmt: skip
+
+
+def test_of_every_option_another_is_tried() -> None:
+    assert {*OTHER} == {"video", "sensor", "overrides", *Recipe.options(), *Outputs.options()}
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_with_another_value_of_any_option_it_is_another_recording(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By its manifest, which `resume` goes by: what stands not in it would go on with other options."""
+    monkeypatch.chdir(tmp_path)
+    codes = np.random.default_rng(0).integers(0, 255, (4, 24, 32), dtype=np.uint8)
+    np.save("stack.npy", codes)
+    np.save("other.npy", codes[:, ::-1])
+    cv2.imwrite("photo.png", codes[0])
+
+    def job(options: dict[str, Any]) -> dict[str, Any]:
+        outputs = Outputs.of(**Outputs.taken_from(options))
+        return job_of(Recipe.of(**options), outputs, None, {})
+
+    beside, value = OTHER[name]
+    assert job(STACK | beside) == job(STACK | beside) != job(STACK | beside | {name: value})
 
 
 @pytest.mark.parametrize(("name", "meant"), [("framesout", "frames"), ("subframe", "subframes"), ("previw", "preview")])
