@@ -261,6 +261,24 @@ def test_the_readme_is_true(folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
         assert printed.getvalue().strip() == expected.strip()
 
 
+def test_the_readme_says_of_every_event_file_what_the_register_does() -> None:
+    from vid2ev.formats import FORMATS, format_named
+
+    table = README.partition("| `--format` ")[2].partition("\n\n")[0]
+    said: dict[str, tuple[str, set[str], str]] = {}
+    for row in table.splitlines()[2:]:
+        names, suffixes, _, holds, read = (cell.strip() for cell in row.split("|")[1:-1])
+        named, ends = (re.findall(r"`([^`]+)`", cell) for cell in (names, suffixes))
+        for name, end in zip(named, ends if len(ends) == len(named) else len(named) * (ends or [""]), strict=True):
+            held = {what.removesuffix(f" ({name})") for what in holds.split(", ") if holds}
+            said[name] = end, {what for what in held if "(" not in what}, read
+    words, registered = {"frame times": "index per frame"}, dict[str, tuple[str, set[str], str]]()
+    for kind in map(format_named, FORMATS):
+        held = {words.get(each, each) for each in kind.keeps}
+        registered[kind.name] = (kind.suffix, held, "yes") if kind.write else ("", set(), "only")
+    assert said == registered
+
+
 def test_the_readme_names_every_preset() -> None:
     from vid2ev.sensors.presets import preset_names
 
