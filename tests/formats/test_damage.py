@@ -7,40 +7,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import foreign
 import numpy as np
 import pytest
-from recordings import events_of, recording_of, written
 
 from vid2ev.errors import DataError
 from vid2ev.formats import FORMATS, format_named, open_events, read_events
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 READABLE = [name for name in FORMATS if format_named(name).open]
-
-
-def sample(name: str, folder: Path) -> Path:
-    """A small file of a format: written by vid2ev, or made of its bytes."""
-    kind, size = format_named(name), (34, 34)
-    gaps = np.random.default_rng(5).choice([0, 0, 1, 70, 5000], 400)
-    events = events_of(np.cumsum(gaps), size)
-    if kind.write:
-        return written(kind, recording_of(events, size), folder)
-    made = {
-        "es": lambda: foreign.es(events, size),
-        "aedat2": lambda: foreign.aedat2(foreign.davis_address(events, (240, 180)), events.t, "DAVIS240C"),
-        "nmnist": lambda: foreign.nmnist(events),
-    }
-    if name not in made:
-        pytest.skip(f"there is no sample of {name}")
-    path = folder / f"events{kind.suffix}"
-    path.write_bytes(made[name]())
-    return path
 
 
 @pytest.mark.parametrize("name", READABLE)
 @pytest.mark.parametrize("kept", [0.1, 0.5, 0.9, 0.999])
-def test_a_file_cut_short_gives_the_events_before_the_cut_or_an_error(tmp_path: Path, name: str, kept: float) -> None:
-    path = sample(name, tmp_path)
+def test_a_file_cut_short_gives_the_events_before_the_cut_or_an_error(
+    tmp_path: Path, name: str, kept: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    from hostile.event_seeds import seeds
+
+    path = seeds(name, tmp_path)[0]
     whole = path.read_bytes()
     (events,) = read_events(path)
     path.write_bytes(whole[: int(kept * len(whole))])
