@@ -29,6 +29,7 @@ from numba import njit
 from vid2ev import UsageError
 from vid2ev.commands import main
 from vid2ev.commands.summary import file_facts, of_the_clip, plan_text, result_facts, short
+from vid2ev.formats import FORMATS, format_named
 from vid2ev.interrupts import heard, never_lost
 from vid2ev.making import conversion
 from vid2ev.recording.folder import Folder
@@ -397,6 +398,15 @@ def test_values_that_cannot_be(sentence: str, arguments: list[str]) -> None:
     refused(2, sentence, "convert", CLIP, *arguments, *QUICK, "--dry-run")
 
 
+@pytest.mark.parametrize("content", [b"t x y p", np.random.default_rng(0).bytes(5000)], ids=["text", "noise"])
+@pytest.mark.parametrize("name", [name for name in FORMATS if name not in ("npz", "rpg")])
+def test_what_is_named_as_event_files_are_and_is_none_is_said_to_be_damaged(name: str, content: bytes) -> None:
+    """But for endings that frames, and lists of videos, have as well."""
+    path = Path(f"made{format_named(name).suffix}")
+    path.write_bytes(content)
+    refused(1, f"{path} is named as event files are", "info", str(path))
+
+
 def test_sources_that_are_none() -> None:
     Path("empty.mp4").touch()
     Path("text.mp4").write_text("not a video\n" * 1000)
@@ -413,10 +423,7 @@ def test_sources_that_are_none() -> None:
     refused(2, "expected one of", "convert", "synthetic:nothing")
     refused(2, "transfer", "convert", str(write_video(Path("clip.mp4"), 3)), "--transfer", "gama:2")
     refused(2, "no such file", "info", "missing.h5")
-    Path("text.h5").write_text("t x y p")
-    refused(1, "text.h5 is named as event files are", "info", "text.h5")
     Path("noise.raw").write_bytes(Path("noise.avi").read_bytes()[:5000])
-    refused(1, "noise.raw is named as event files are", "info", "noise.raw")
     refused(1, "noise.raw", "convert", "noise.raw")
     refused(2, "add --frames-out", "convert", "synthetic:ramp", "--frames-by", "count:100")
     Path("odd").mkdir()

@@ -15,7 +15,7 @@ from vid2ev.errors import DataError, UsageError
 if TYPE_CHECKING:
     from vid2ev.sources import Source
 
-EVENT_SUFFIXES = {".aedat", ".aedat4", ".bag", ".dat", ".es", ".h5", ".hdf5", ".raw"}  # of no source of frames
+OF_FRAMES = {".npz", ".txt"}  # endings of event files that sources of frames have, too
 
 
 @click.command(short_help="Say what a recording, an event file or a video holds.")
@@ -66,12 +66,14 @@ def info(file: str, as_json: bool, **options: Any) -> None:
 
 def _opened(path: Path, file: str, options: dict[str, Any]) -> Source:
     """The source of frames, whatever its name; what is none is an event file that is damaged if it is named as one."""
+    from vid2ev.formats import FORMATS, format_named
     from vid2ev.sources import open_source
 
     try:
         return open_source(file, **options)
     except DataError as error:
-        if os.path.isfile(path) and path.suffix.lower() in EVENT_SUFFIXES:
+        of_events = {format_named(name).suffix for name in FORMATS} - OF_FRAMES | {".hdf5"}
+        if os.path.isfile(path) and path.suffix.lower() in of_events:
             raise DataError(
                 f"{path} is named as event files are, but begins as none; it is damaged or something else"
             ) from error
