@@ -24,6 +24,7 @@ from interp.interpolate.fill import Filled
 from interp.interpolate.instants import Instant
 from interp.interpolate.pictures import Pictures
 from interp.interpolate.take import Options, open_take
+from interp.methods import METHODS, open_method
 from interp.networks import make
 from interp.own_codes import shown
 from interp.representation.carried import footprint_of
@@ -85,7 +86,7 @@ def test_frames_of_16_bits_and_grey_ones_stay_what_they_are(tmp_path: Path) -> N
         assert np.abs(out[1] - middle).max() <= 0.51 and out[1].dtype == source[0].dtype
 
 
-@pytest.mark.parametrize("method", ["nearest", "linear", "flow", "integration", "both", "bridge"])
+@pytest.mark.parametrize("method", METHODS)
 def test_where_nothing_happens_all_frames_are_the_key_frame(tmp_path: Path, method: str) -> None:
     frame = texture()[:, : SIZE[0]]
     source = recording(tmp_path / "in", [frame] * 3)
@@ -96,6 +97,13 @@ def test_where_nothing_happens_all_frames_are_the_key_frame(tmp_path: Path, meth
     assert not told["gaps_s"]
     for found in made(tmp_path / "out"):
         np.testing.assert_array_equal(found, frame)
+
+
+def test_the_help_names_every_method_and_those_that_need_events() -> None:
+    shown = next(option.help for option in command.params if option.name == "method").partition(".")[0]
+    frames, events = (re.findall(r"\w+", part) for part in shown.split(" or with events "))
+    needs = dict.fromkeys(frames, False) | dict.fromkeys(events, True)
+    assert needs == {name: open_method(name).needs_events for name in METHODS}
 
 
 def test_nothing_is_interpolated_across_a_cut(tmp_path: Path) -> None:
