@@ -235,6 +235,25 @@ def test_every_effect_says_what_it_is_in_units_and_where_it_comes_from() -> None
                 assert units[suffix] in field.description, f"{name}: {key} does not say {units[suffix]}"
 
 
+def test_every_effect_is_of_a_sensor_whose_plans_can_leave_it_out() -> None:
+    """But for the thresholds and the log, without which there are no events."""
+    from vid2ev.physics.comparator import Comparator
+    from vid2ev.physics.log_curve import LogCurve
+    from vid2ev.plan.frame_camera import FRAME_EFFECTS
+    from vid2ev.plan.plan import EFFECTS
+    from vid2ev.sensors.cis_spec import CisSpec
+    from vid2ev.sensors.spec import DvsSpec
+
+    for name, model in effects().items():
+        known = [plans for spec, plans in ((DvsSpec, EFFECTS), (CisSpec, FRAME_EFFECTS)) if issubclass(spec, model)]
+        assert known, f"{name}: {model.__name__} is no base of a sensor's specification"
+        for plans in known:
+            off = {key for effect in plans.values() for key in effect.off}
+            assert model in (Comparator, LogCurve) or off & {*model.model_fields}, (
+                f"no line of the plans has {name} off"
+            )
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help_and_stands_in_the_readme(name: str) -> None:
     module, _, attribute = COMMANDS[name].partition(":")

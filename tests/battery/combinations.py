@@ -11,6 +11,8 @@ The everyday ones are in the long suite, covering(2) is in the slow one.  The wh
 likes, is
 
     VID2EV_SHARE=1/1000 python -m pytest tests/battery -m slow
+
+`test_combinations.py` holds that every parameter is on some axis.
 """
 
 from __future__ import annotations
@@ -45,10 +47,12 @@ FREE: dict[str, Choices] = {
     "phase": {"in step": {"random_phase": False}, "random": {"random_phase": True}},
     "cold": {"none": {}, "some": {"cold_probability": 0.2}},
     "delay": {"none": {}, "some": {"delay_us": 1234.5}},
-    "readout": {"free": {}, "fixed rate": {"frame_rate_hz": 700.0}},
+    "readout": {"free": {}, "fixed rate": {"frame_rate_hz": 700.0},
+                "causal": {"frame_rate_hz": 700.0, "rounding": "causal"}},
     "crossings": {"many": {}, "few": {"max_crossings": 3}},
-    "dark": {"some": {}, "little": {"dark_level": 1e-12}, "much": {"dark_level": 1.0}},
-}
+    "dark": {"some": {}, "little": {"dark_level": 1e-12, "bandwidth_dark": 1e-3, "shot_light_factor": 0.0},
+             "much": {"dark_level": 1.0, "bandwidth_dark": 1.0, "shot_light_factor": 1.0}},
+}  # fmt: skip
 KERNEL: dict[str, Choices] = {
     "poles": {name: dict(zip(("photoreceptor_tau_us", "follower_tau_us"), taus, strict=True))
               for name, taus in POLES.items()},
