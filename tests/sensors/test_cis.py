@@ -13,7 +13,7 @@ from vid2ev.light.tags import tag_of, transfer_of
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.cis import Cis
-from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.cis_spec import EFFECTS, CisSpec
 from vid2ev.sensors.presets import CIS, cis_names, load_cis, read_sensor
 from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import LUMINANCE, Frame
@@ -269,7 +269,9 @@ def test_an_exposure_comes_with_the_frame_at_which_its_last_row_closes(blur: boo
 
 
 def test_the_truth_of_a_recording_samples_without_noise():
+    assert EVERYTHING.effects() == [*EFFECTS]
     truth = EVERYTHING.sampling(960.0)
+    assert truth.effects() == ["shading", "full_well"]
     assert (truth.exposure_us, truth.line_us, truth.frame_rate_hz) == (0, 0, 960.0)
     assert truth.noiseless() == truth and truth.shading == EVERYTHING.shading
     assert (truth.slope, truth.full_well_e) == (EVERYTHING.slope, EVERYTHING.full_well_e)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from pydantic import Field
@@ -16,9 +17,16 @@ from vid2ev.physics.shutter import Shutter
 from vid2ev.sensors.record import Record
 
 NOISELESS = {"noise_lsb": 0.0, "shot_noise": False, "read_noise_e": 0.0, "prnu": 0.0, "dsnu": 0.0}
-EFFECTS = (  # in the order of the path of light
-    "exposure", "rolling_shutter", "shading", "fixed_pattern", "shot_noise", "full_well", "read_noise", "noise",
-)  # fmt: skip
+EFFECTS: dict[str, Callable[[CisSpec], bool]] = {  # in the order of the path of light: whether a camera has it
+    "exposure": lambda spec: spec.exposure_us > 0 and spec.blur,
+    "rolling_shutter": lambda spec: spec.line_us > 0,
+    "shading": lambda spec: bool(spec.shading),
+    "fixed_pattern": lambda spec: spec.prnu > 0 or spec.dsnu > 0,
+    "shot_noise": lambda spec: spec.shot_noise,
+    "full_well": lambda spec: spec.full_well_e > 0,
+    "read_noise": lambda spec: spec.read_noise_e > 0,
+    "noise": lambda spec: spec.noise_lsb > 0,
+}
 INSTANT = {"exposure_us": 0.0, "line_us": 0.0}
 
 
@@ -68,14 +76,4 @@ class CisSpec(  # the order of the bases, last to first, is the order of the fie
 
     def effects(self) -> list[str]:
         """Names of the effects that these parameters switch on, in the order of the path of light."""
-        on = {
-            "exposure": self.exposure_us > 0 and self.blur,
-            "rolling_shutter": self.line_us > 0,
-            "shading": bool(self.shading),
-            "fixed_pattern": self.prnu > 0 or self.dsnu > 0,
-            "shot_noise": self.shot_noise,
-            "full_well": self.full_well_e > 0,
-            "read_noise": self.read_noise_e > 0,
-            "noise": self.noise_lsb > 0,
-        }
-        return [name for name, used in on.items() if used]
+        return [name for name, used in EFFECTS.items() if used(self)]
