@@ -106,9 +106,14 @@ def planes_of(
     if old is None or any(len(getattr(old, name)) != (pixels if kept else UNUSED) for name, kept in wanted.items()):
         old = blank_planes(pixels, flags, wanted)
     old.rest[...], old.count[...] = 0, 0
-    if wanted["theta"]:
-        fill_thresholds(old.theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
+    draw_thresholds(old.theta, spec, num)
     return old._replace(hot=np.flatnonzero(bad == 1).astype(np.int32), shade=shade_of(spec, width, height)), bad
+
+
+def draw_thresholds(theta: np.ndarray, spec: DvsSpec, num: Numbers) -> None:
+    """The thresholds of the pixels into theta [float32 [n, 2], nat], where they have some of their own."""
+    if num.mismatch > 0:
+        fill_thresholds(theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
 
 
 def bad_of(spec: DvsSpec, num: Numbers, pixels: int) -> np.ndarray:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, HIGH, LOW, PITCH, Flags, Numbers, Planes, stride_of
-from vid2ev.physics.mismatch import fill_thresholds
-from vid2ev.sensors.compiled import RECORDS, UNUSED, bad_of, kept_of, shade_of
+from vid2ev.sensors.compiled import RECORDS, UNUSED, bad_of, draw_thresholds, kept_of, shade_of
 from vid2ev.sensors.spec import DvsSpec
 
 
@@ -35,8 +34,7 @@ def blank_planes(
     pixels, used = size[0] * size[1], [kept_of(flags, num) for num in numbers]
     total, thetas = len(specs) * pixels, np.zeros((len(specs), pixels, 2), np.float32)
     for theta, spec, num in zip(thetas, specs, numbers, strict=True):
-        if num.mismatch > 0:
-            fill_thresholds(theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
+        draw_thresholds(theta, spec, num)
     room = {name: total if any(each[name] for each in used) else UNUSED for name in RECORDS}
     records = {name: memory.zeros((room[name], *shape), kind) for name, (kind, shape) in RECORDS.items()}
     records["theta"] = memory.put(thetas.reshape(-1, 2)[: room["theta"]])
