@@ -13,8 +13,9 @@ from pydantic import ValidationError
 
 from interp.data.inputs import known_by
 from interp.data.pool import Pool
-from interp.networks import names
-from interp.train.job import Job
+from interp.networks import make, names
+from interp.networks.event_fed import EventFed
+from interp.train.job import EVENT_FED, Job
 from interp.train.made_of import validation_of
 from interp.train.recipe import Recipe
 from vid2ev.errors import UsageError
@@ -27,6 +28,10 @@ def test_a_job_comes_back_from_its_json(network: str) -> None:
     )
     assert Job(**json.loads(json.dumps(job.model_dump(mode="json")))) == job
     assert (job.recipe.rate, job.clips.scenes, job.samples.size, job.window.begin) == (0.002, 1, 64, 8)
+
+
+def test_networks_of_events_are_trained_as_such() -> None:
+    assert [name for name in names() if isinstance(make(name), EventFed)] == [*EVENT_FED]
 
 
 def test_settings_reach_what_they_are_of() -> None:
