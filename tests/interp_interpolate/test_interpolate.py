@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import fields, replace
 from fractions import Fraction
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +123,34 @@ def test_nothing_is_interpolated_across_a_cut(tmp_path: Path) -> None:
             np.testing.assert_array_equal(out[number], frames[4])
     told = interpolate(tmp_path / "a", tmp_path / "keep", multiple=4, method="linear", cuts="keep")
     assert not told["gaps_s"] and not np.array_equal(made(tmp_path / "keep")[13], frames[3])
+
+
+OTHERWISE: dict[str, Any] = {  # (begun with -x 2, linear, and events a.npz)
+    "start_s": 0.03, "stop_s": 0.04, "crop": "32x24+1+1", "size": "32x24", "transfer": "linear",
+    "source_hz": Fraction(25), "contrast": (0.2, 0.3), "refractory_us": 500.0, "events": Path("b.npz"),
+    "multiple": 3, "fps": 60, "method": "nearest", "network": "rrin_light-tiny", "hdr": "hdr-tiny", "cuts": "keep",
+    "format": "exr", "tile": "64x64",
+}  # fmt: skip
+ANY_TIME = {"output", "overwrite", "resume", "report", "told"}
+
+
+def test_with_another_value_of_any_option_nothing_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    of_source = {field.name for field in fields(Options)}
+    known = {*signature(interpolate).parameters} - ANY_TIME - {"options"} | of_source
+    assert known - {*OTHERWISE} == {"source", "device", "running", "play"}  # (running is of networks, play of films)
+    images(Path("a"), [frame.repeat(3, 0).repeat(3, 1) for frame in moving(3)])
+    for name, t in (("a.npz", np.array([9, 40_000])), ("b.npz", np.array([9, 50_000]))):
+        np.savez(name, t=t, **{column: np.ones(2, np.uint8) for column in "xyp"}, width=64, height=48)
+    began: dict[str, Any] = {"multiple": 2, "method": "linear", "options": Options(events=Path("a.npz"))}
+    interpolate("a", "out", **began)
+    interpolate("a", "out", resume=True, **began)
+    for name, value in OTHERWISE.items():
+        options = replace(began["options"], **{name: value} if name in of_source else {})
+        asked = began | {"options": options} | ({} if name in of_source else {name: value})
+        taken = {"fps": "multiple", "network": "method"}.get(name)  # (whose place it takes)
+        with pytest.raises(UsageError, match="out was begun with "):
+            interpolate("a", "out", resume=True, **{key: asked[key] for key in asked if key != taken})
 
 
 def test_gaps_of_which_no_events_are_known_are_named(tmp_path: Path) -> None:
