@@ -190,12 +190,6 @@ def our_options() -> set[str]:
     return {name for option in options for name in (*option.opts, *option.secondary_opts)}
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda page: page.name)
-def test_links_of_the_pages_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
-        assert target.startswith("http") or (page.parent / target).exists(), target
-
-
 def test_the_page_names_options_keys_and_files_that_are_there() -> None:
     page = FROM_V2E.read_text(encoding="utf-8")
     rows = page.partition("## Options")[2].partition("\n\nIn v2e")[0]
