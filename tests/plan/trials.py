@@ -96,7 +96,8 @@ def table(outcomes: Iterable[Outcome]) -> dict[tuple[str, str], list[float]]:
 
 
 def drawn(seed: int) -> DvsSpec:
-    """A sensor of drawn parameters, everything that the plan knows but fixed times and delays among them."""
+    """A sensor of drawn parameters: all effects that the plan knows but noise of the photoreceptor, delays and event
+    frames."""
     draws = random.Random(seed)
 
     def between(least: float, most: float) -> float:
