@@ -56,6 +56,12 @@ def test_units_are_given_apart() -> None:
     assert keys["cis"]["exposure_us"]["unit"] == "us" and keys["cis"]["noise_lsb"]["unit"] == "LSB"
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_key_whose_name_ends_in_a_unit_has_one(kind: Kind) -> None:
+    keys = json.loads(run("paper", "--json"))[kind.table]
+    assert not [key for key in keys if key.endswith(("_us", "_hz", "_e", "_lsb")) and not keys[key]["unit"]]
+
+
 @pytest.mark.parametrize(("kind", "name"), ALL)
 def test_a_page_says_what_each_key_may_be(kind: Kind, name: str) -> None:
     page, keys = " ".join(run(name).split()), json.loads(run(name, "--json"))[kind.table]

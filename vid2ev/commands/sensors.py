@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
@@ -52,18 +51,17 @@ def _explained(name: str, kind: Kind) -> tuple[SensorFile, dict[str, dict[str, A
     reached = spec.reached_spreads() if isinstance(spec, DvsSpec) else {}
     controls = {control.key: control for control in controls_of(kind.spec)}
     for key in dict.fromkeys([*sensor.values, *kind.spec.model_fields]):
-        meaning = kind.spec.model_fields[key].description or ""
-        unit = re.search(r" \[(\w+)\]", meaning)
+        control = controls[key]
         explained[key] = {
             "value": values[key],
-            "unit": unit[1] if unit else None,
-            "meaning": meaning.replace(unit[0], "") if unit else meaning,
+            "unit": control.unit or None,
+            "meaning": control.meaning,
             "source": sensor.sources.get(key) if key in sensor.values else "default",
         }
-        if controls[key].limits:
-            explained[key]["limits"] = controls[key].limits
-        if controls[key].choices:
-            explained[key]["choices"] = list(controls[key].choices)
+        if control.limits:
+            explained[key]["limits"] = control.limits
+        if control.choices:
+            explained[key]["choices"] = list(control.choices)
         if key in reached:
             explained[key]["reached"] = list(reached[key])
     return sensor, explained
