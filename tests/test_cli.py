@@ -36,7 +36,9 @@ from vid2ev.recording.folder import Folder
 from vid2ev.recording.manifest import difference
 from vid2ev.seen import instants
 from vid2ev.seen.instants import Instant
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.tiles import Tiles
+from vid2ev.tracks.outputs import Outputs
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
 LONG = "a" * 300
@@ -405,6 +407,23 @@ def test_what_is_named_as_event_files_are_and_is_none_is_said_to_be_damaged(name
     path = Path(f"made{format_named(name).suffix}")
     path.write_bytes(content)
     refused(1, f"{path} is named as event files are", "info", str(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "left_out"),
+    [
+        ("convert", set()),
+        ("cost", {"labels", "truth", "truth_rate_hz"}),
+        ("plan", {"labels", "truth", "truth_rate_hz", "seed"}),
+    ],
+)
+def test_what_decides_light_and_sensors_can_be_said_to_all_that_look_at_them(name: str, left_out: set[str]) -> None:
+    """An option of recipes is one of these commands, but for what changes nothing there."""
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    recipes, there = {"sensor", "overrides", *Recipe.options()}, {option.name for option in command.params}
+    assert recipes - there == left_out
+    assert name != "convert" or {*Outputs.options()} <= there
 
 
 def test_sources_that_are_none() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from vid2ev.commands.auto import Auto
 from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.source_options import camera_options, source_options
 
@@ -18,9 +19,13 @@ from vid2ev.commands.source_options import camera_options, source_options
     "--upsample", default="flow", show_default=True, metavar="none|linear|flow|net",
     help="Light between the frames: what is measured is what the sensor would see.",
 )  # fmt: skip
+@click.option("--subframes", type=Auto("auto", 1, "subframes"), default="auto", help="As for convert.")
 @click.option("--max-subframes", type=click.IntRange(1), default=64, show_default=True, help="As for convert.")
 @click.option("--cuts", type=click.Choice(["restart", "keep"]), default="restart", help="As for convert.")
 @source_options
+@click.option(
+    "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False), help="As for convert."
+)
 @click.option(
     "--effects", default="auto", show_default=True, metavar="auto|all|none|NAME[,NAME...]", help="Effects to keep."
 )
