@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import re
 from html.parser import HTMLParser
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.textpath import TextPath
 from scored import METHODS, SEQUENCES, row, scored
 
 from interp.evaluate.conditions import varying
@@ -18,7 +20,7 @@ from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_repo
 from interp.evaluate.report.blocks import Cell
 from interp.evaluate.report.content import FROM_TRUTH, document
 from interp.evaluate.report.coverage import fullest, uneven
-from interp.evaluate.report.frame_plots import over_time_plot
+from interp.evaluate.report.frame_plots import distribution_plot, over_time_plot
 from interp.evaluate.report.markdown import escaped, markdown
 from interp.evaluate.report.mean_plots import condition_plot, position_plot
 from interp.evaluate.report.overview import (
@@ -166,6 +168,37 @@ def test_a_plot_names_each_method_that_it_has_lines_of() -> None:
     against = condition_plot(rows, condition, edges)
     for drawing in (over_time_plot(rows), position_plot(rows), against and against.svg):
         assert drawing and [text for text in ElementTree.fromstring(drawing).itertext() if text in names] == names
+
+
+def test_names_that_begin_alike_are_told_apart_in_plots() -> None:
+    methods = [f"rrin_slomo_events_small_rate0.0001_batch32_seed{k}" for k in range(7)]
+    sequences = [f"recordings_outdoors_in_the_rain_2021_take_{k}" for k in range(5)]
+    rows = [
+        row(sequence=sequence, method=method, position=p, psnr=30.0 + p, ssim=0.9, t_us=p)
+        for sequence in sequences
+        for method in methods
+        for p in (1, 2, 3)
+    ]
+    for drawing, names in ((distribution_plot(rows), [*methods, *sequences]), (position_plot(rows), methods)):
+        texts = [text for text in ElementTree.fromstring(drawing or "").itertext() if "…" in text]
+        assert len(set(texts)) == len(names)
+        assert all(any(map(name.endswith, (text.partition("…")[2] for text in texts))) for name in names)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7])
+def test_names_above_panels_do_not_run_into_each_other(count: int) -> None:
+    methods = [f"rrin_slomo_events_small_rate0.0001_batch32_and_all_the_rest_of_it_{k}" for k in range(count)]
+    rows = [row(sequence="outdoors_in_the_rain_2021", method=method, psnr=30.0) for method in methods]
+    root = ElementTree.fromstring(distribution_plot(rows) or "")
+    right = float(root.attrib["viewBox"].split()[2])
+    titles = [each for each in root.iter() if (each.text or "").startswith("rrin")]
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for each in titles:
+        start, wide = float(each.attrib["x"]), float(TextPath((0, 0), each.text, size=9).get_extents().width)
+        spans.setdefault(each.attrib["y"], []).append((start, start + wide))
+    assert sum(map(len, spans.values())) == count
+    for line in spans.values():
+        assert all(end < start for (_, end), (start, _) in pairwise(sorted(line))) and max(line)[1] < right
 
 
 def test_nothing_scored(tmp_path: Path) -> None:

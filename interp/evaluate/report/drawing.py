@@ -86,12 +86,15 @@ def legend(made: Any, axes: Any, names: Sequence[str]) -> None:
     lines = axes.get_lines()[: len(names)]
     drawn = made.legend(lines, ["-"] * len(lines), loc="outside upper left", ncols=3, fontsize=8, handlelength=3)
     for text, name in zip(drawn.get_texts(), names, strict=True):  # (matplotlib leaves out labels that begin with _)
-        text.set_text(shortened(name, 32))
+        text.set_text(shortened(name, 28))
 
 
 def shortened(name: str, letters: int) -> str:
-    """A name of so many letters at most."""
-    return name if len(name) <= letters else f"{name[: letters - 1]}…"
+    """A name of so many letters at most, without its middle: names that begin alike differ at their ends."""
+    if len(name) <= letters:
+        return name
+    end = (letters - 1) // 2
+    return f"{name[: letters - 1 - end]}…{name[len(name) - end :]}"
 
 
 def svg_of(made: Any, name: str, described: str) -> str:

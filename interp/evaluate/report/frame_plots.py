@@ -14,6 +14,7 @@ from interp.evaluate.row import Row
 from interp.evaluate.tables import split, values
 
 ACROSS = 3  # panels beside each other
+TITLE = 72  # letters above all of these
 MOST_SEQUENCES = 8  # drawn over time: those in which scores change most
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
@@ -35,7 +36,7 @@ def distribution_plot(rows: Sequence[Row]) -> str | None:
             own = split(part, lambda row: row.sequence)
             for place, sequence in enumerate(sequences):
                 _draw_spread(axes, place, values(own.get(sequence, []), "psnr"), ACCENT if method == best else SOFT)
-            axes.set_title(shortened(method, 32))
+            axes.set_title(shortened(method, TITLE // across))
             axes.set_yticks(range(len(sequences)), [shortened(sequence, 22) for sequence in sequences])
             axes.tick_params(axis="y", length=0)
             axes.grid(axis="y", visible=False)
