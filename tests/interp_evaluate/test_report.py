@@ -20,6 +20,7 @@ from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_repo
 from interp.evaluate.report.blocks import Cell
 from interp.evaluate.report.content import FROM_TRUTH, document
 from interp.evaluate.report.coverage import fullest, uneven
+from interp.evaluate.report.drawing import styles
 from interp.evaluate.report.frame_plots import distribution_plot, over_time_plot
 from interp.evaluate.report.markdown import escaped, markdown
 from interp.evaluate.report.mean_plots import condition_plot, position_plot
@@ -199,6 +200,14 @@ def test_names_above_panels_do_not_run_into_each_other(count: int) -> None:
     assert sum(map(len, spans.values())) == count
     for line in spans.values():
         assert all(end < start for (_, end), (start, _) in pairwise(sorted(line))) and max(line)[1] < right
+
+
+@pytest.mark.parametrize("best", ["m5", None])
+def test_each_method_is_drawn_in_its_own_way(best: str | None) -> None:
+    drawn = styles([f"m{k}" for k in range(13)], best).values()
+    of_lines = {(each["color"], each["linestyle"]) for each in drawn}
+    of_marks = {(each["linestyle"], each["marker"]) for each in drawn if each["zorder"] == 2}
+    assert len(of_lines) == 12 + (best is not None) and len(of_marks) == 13 - (best is not None)
 
 
 def test_nothing_scored(tmp_path: Path) -> None:

@@ -69,12 +69,14 @@ def figure(width_in: float, height_in: float) -> Any:
 
 
 def styles(methods: list[str], best: str | None) -> dict[str, dict[str, Any]]:
-    """How each method is drawn: the best with the accent, the others in grey, told apart by lines and marks."""
+    """How each method is drawn: the best with the accent, the others in grey, told apart by lines and marks; where
+    these come again, with other marks for each line, and by turns darker."""
     found: dict[str, dict[str, Any]] = {}
     for number, method in enumerate(name for name in methods if name != best):
+        again, line = divmod(number, len(QUIET))
         found[method] = {
-            "color": SOFT, "linestyle": QUIET[number % len(QUIET)], "marker": MARKS[number % len(MARKS)], "zorder": 2,
-            "markersize": 3.5,
+            "color": INK if again % 2 else SOFT, "linestyle": QUIET[line], "marker": MARKS[(line + again) % len(MARKS)],
+            "zorder": 2, "markersize": 3.5,
         }  # fmt: skip
     if best is not None:
         found[best] = {"color": ACCENT, "linestyle": "-", "marker": "o", "zorder": 3, "markersize": 4, "linewidth": 2}
