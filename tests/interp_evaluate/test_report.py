@@ -166,8 +166,8 @@ def test_a_plot_names_each_method_that_it_has_lines_of() -> None:
         for p in (1, 2, 3)
     ]
     ((condition, edges),) = varying(rows)
-    against = condition_plot(rows, condition, edges)
-    for drawing in (over_time_plot(rows), position_plot(rows), against and against.svg):
+    over_time, against = over_time_plot(rows), condition_plot(rows, condition, edges)
+    for drawing in (over_time and over_time.svg, position_plot(rows), against and against.svg):
         assert drawing and [text for text in ElementTree.fromstring(drawing).itertext() if text in names] == names
 
 
@@ -208,6 +208,20 @@ def test_each_method_is_drawn_in_its_own_way(best: str | None) -> None:
     of_lines = {(each["color"], each["linestyle"]) for each in drawn}
     of_marks = {(each["linestyle"], each["marker"]) for each in drawn if each["zorder"] == 2}
     assert len(of_lines) == 12 + (best is not None) and len(of_marks) == 13 - (best is not None)
+
+
+@pytest.mark.parametrize("count", [1, 8, 9, 30])
+def test_the_plot_over_time_says_which_sequences_it_leaves_out(count: int) -> None:
+    rows = [row(sequence=f"s{k}.", position=p, psnr=30.0 + k * p, t_us=p) for k in range(count) for p in (1, 2)]
+    plot = over_time_plot([*rows, row(sequence="of one frame", psnr=30.0)])
+    assert plot
+    shown = [text for text in ElementTree.fromstring(plot.svg).itertext() if text in {each.sequence for each in rows}]
+    assert shown == [f"s{k}." for k in range(count)][-8:]
+    assert plot.caption == (
+        "PSNR of each frame."
+        if len(shown) == count
+        else f"PSNR of each frame, of the 8 of {count} sequences in which it changes most."
+    )
 
 
 def test_nothing_scored(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def _chapter(rows: Sequence[Row], sets: Mapping[str, Sequence[str]]) -> dict[str
             *_drawn(position_plot(rows), "Mean score at each place in the gap."),
             *(position_table(rows, field, name) for field, name in SCORES.items()),
         ],
-        "Over time": _drawn(over_time_plot(rows), "PSNR of each frame."),
+        "Over time": [plot] if (plot := over_time_plot(rows)) else [],
     }  # fmt: skip
     for condition, edges in conditions:
         if not (plot := condition_plot(rows, condition, edges)):  # (of what is known, no score is)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from interp.evaluate.report.blocks import Plot
 from interp.evaluate.report.drawing import ACCENT, INK, SOFT, WIDTH_IN, figure, legend, look, shortened, styles, svg_of
 from interp.evaluate.report.numbers import SCORES
 from interp.evaluate.report.overview import best_method, by_method
@@ -47,8 +48,9 @@ def distribution_plot(rows: Sequence[Row]) -> str | None:
         return svg_of(made, f"spread-{rows[0].multiple}", "PSNR of the frames of each sequence, for each method")
 
 
-def over_time_plot(rows: Sequence[Row]) -> str | None:
-    """PSNR of each frame over time, a panel for each sequence; None where none has several frames."""
+def over_time_plot(rows: Sequence[Row]) -> Plot | None:
+    """PSNR of each frame over time, a panel for each sequence, of many those in which it changes most; None where none
+    has several frames."""
     parts = split((row for row in rows if np.isfinite(row.psnr)), lambda row: row.sequence)
     several = [name for name in parts if len({row.t_us for row in parts[name]}) > 1]
     widest = sorted(several, key=lambda name: -float(np.ptp(values(parts[name], "psnr"))))[:MOST_SEQUENCES]
@@ -69,7 +71,9 @@ def over_time_plot(rows: Sequence[Row]) -> str | None:
             axes.set_ylabel(SCORES["psnr"])
         panels[-1].set_xlabel("time [s]")
         legend(made, panels[0], list(by_method(rows)))
-        return svg_of(made, f"time-{rows[0].multiple}", "PSNR of each frame over time")
+        svg = svg_of(made, f"time-{rows[0].multiple}", "PSNR of each frame over time")
+    of = f", of the {len(shown)} of {len(several)} sequences in which it changes most"
+    return Plot(svg, f"PSNR of each frame{of if len(shown) < len(several) else ''}.")
 
 
 def _draw_spread(axes: Any, place: float, scores: np.ndarray, colour: str) -> None:
