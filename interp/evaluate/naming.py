@@ -1,4 +1,4 @@
-"""Names of what is evaluated that can be those of files."""
+"""Names of what is evaluated: those that can be those of files, and short ones."""
 
 from __future__ import annotations
 
@@ -26,3 +26,11 @@ def apart(names: list[str]) -> list[str]:
             other, number = f"{name}_{number}", number + 1
         found.append(other)
     return found
+
+
+def shortened(name: str, letters: int) -> str:
+    """A name of so many letters at most, without its middle: names that begin alike differ at their ends."""
+    if len(name) <= letters:
+        return name
+    end = (letters - 1) // 2
+    return f"{name[: letters - 1 - end]}…{name[len(name) - end :]}"

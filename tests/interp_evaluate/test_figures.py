@@ -160,6 +160,18 @@ def test_letters_stand_on_one_line_and_are_cut_at_the_edge() -> None:
     assert narrow.shape == (STRIP_PX, 20, 3) and (narrow[0] == GROUND).all() and narrow.max() <= max(INK)
 
 
+@pytest.mark.parametrize("width", [60, 160, 400])
+def test_names_that_are_too_long_for_a_strip_are_told_apart_by_their_ends(width: int) -> None:
+    names = [f"{'a very long name of a method ' * 3}{k}" for k in range(3)]
+    strips = [strip(name, width) for name in names]
+    assert len({each.tobytes() for each in strips}) == 3
+    assert all((each[:, -1] == GROUND).all() for each in strips), "no letter is cut"
+    assert (
+        strip("short", width)[:, : letters("short").shape[1] + 4]
+        == strip("short", 500)[:, : letters("short").shape[1] + 4]
+    ).all()
+
+
 @pytest.mark.parametrize(("width", "height"), [(1, 300), (300, 1), (2, 200)])
 def test_what_a_line_camera_sees_fits_on_sheets(width: int, height: int) -> None:
     """A sheet is no larger than so many times what its pictures are meant to be."""

@@ -7,10 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from interp.evaluate.naming import shortened
+
 GROUND, INK, ACCENT = (16, 18, 24), (226, 228, 232), (240, 166, 70)  # of sheets: that of events, and what is on it
 SIZE_PX = 12
 BELOW_PX = SIZE_PX // 3  # what g and y need
 STRIP_PX = SIZE_PX + 8  # the height of a line of letters
+INSET_PX = 4  # of letters on it
 
 
 @lru_cache(maxsize=256)
@@ -41,7 +44,8 @@ def write(picture: np.ndarray, text: str, left: int, top: int, colour: tuple[int
 
 
 def strip(text: str, width: int) -> np.ndarray:
-    """A line of text on dark ground, uint8 [STRIP_PX, width, 3]."""
+    """A line of text on dark ground, uint8 [STRIP_PX, width, 3], without its middle where it is too long."""
     made = np.full((STRIP_PX, width, 3), GROUND, np.uint8)
-    write(made, text, 4, 2)
+    fitting = (shortened(text, count) for count in range(len(text), 1, -1))
+    write(made, next((each for each in fitting if letters(each).shape[1] <= width - INSET_PX), text), INSET_PX, 2)
     return made

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from interp.evaluate.naming import shortened
+
 WIDTH_IN = 7.6
 INK, SOFT, FAINT, ACCENT = "#010203", "#040506", "#070809", "#0a0b0c"  # stand-ins
 VARIABLES = {INK: "var(--ink)", SOFT: "var(--soft)", FAINT: "var(--faint)", ACCENT: "var(--accent)"}
@@ -89,14 +91,6 @@ def legend(made: Any, axes: Any, names: Sequence[str]) -> None:
     drawn = made.legend(lines, ["-"] * len(lines), loc="outside upper left", ncols=3, fontsize=8, handlelength=3)
     for text, name in zip(drawn.get_texts(), names, strict=True):  # (matplotlib leaves out labels that begin with _)
         text.set_text(shortened(name, 28))
-
-
-def shortened(name: str, letters: int) -> str:
-    """A name of so many letters at most, without its middle: names that begin alike differ at their ends."""
-    if len(name) <= letters:
-        return name
-    end = (letters - 1) // 2
-    return f"{name[: letters - 1 - end]}…{name[len(name) - end :]}"
 
 
 def svg_of(made: Any, name: str, described: str) -> str:

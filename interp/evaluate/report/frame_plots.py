@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from interp.evaluate.naming import shortened
 from interp.evaluate.report.blocks import Plot
-from interp.evaluate.report.drawing import ACCENT, INK, SOFT, WIDTH_IN, figure, legend, look, shortened, styles, svg_of
+from interp.evaluate.report.drawing import ACCENT, INK, SOFT, WIDTH_IN, figure, legend, look, styles, svg_of
 from interp.evaluate.report.numbers import SCORES
 from interp.evaluate.report.overview import best_method, by_method
 from interp.evaluate.row import Row
