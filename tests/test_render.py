@@ -240,6 +240,23 @@ def test_the_line_says_when_and_how_many() -> None:
     assert line[:, :100].max() > 120 and line[:, -100:].max() > 120 and np.abs(line[:, 400:800] - DARK).max() == 0
 
 
+@pytest.mark.parametrize("width", [1, 20, 40, 60, 61, 62, 63, 64, 65, 90])
+def test_the_line_of_a_narrow_picture_has_no_number_of_which_a_part_is_cut_off(width: int) -> None:
+    times = events_of([0, 123_000], 0, 0, 1)
+    lines = []
+    for name, across in (("narrow", width), ("wide", 200)):
+        write(times, f"{name}.h5", size=(across, 600))
+        render(f"{name}.h5", "-o", f"{name}.png", "--size", "600", "--by", "count:2")
+        lines.append(picture(f"{name}.png")[-canvas.LINE :])
+    narrow, wide = lines
+    said = wide[:, :100]
+    last = np.flatnonzero(np.abs(said - DARK).max(axis=(0, 2)))[-1]
+    if last < width - 1:
+        np.testing.assert_array_equal(narrow[:, : last + 1], said[:, : last + 1])
+    else:
+        assert np.abs(narrow - DARK).max() == 0
+
+
 # ------------------------------------------------------------------------------------------------------- with frames
 
 

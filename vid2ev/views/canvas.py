@@ -31,7 +31,7 @@ class Canvas:
     limit   the longest side of a picture [pixels], without the line
     frames  shown with the events; None for events alone
     stamp   whether there is a line: at the left the end of the slice [s] after `zero_us` with `digits` decimals, at the
-            right how many events it has
+            right how many events it has; what has no room is left out
     """
 
     def __init__(
@@ -72,6 +72,8 @@ class Canvas:
         line[:] = DARK
         left, right = f"{(part.stop_us - self._zero_us) / 1e6:.{self._digits}f} s", f"{part.events:,} events"
         widths = [cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0] for text in (left, right)]
+        if INSET + widths[0] > self.size[0]:
+            return  # (of a time that is cut, what is left reads as another)
         _write(line, left, INSET)
         if sum(widths) + 4 * INSET <= self.size[0]:
             _write(line, right, self.size[0] - INSET - widths[1])
