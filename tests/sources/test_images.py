@@ -105,6 +105,27 @@ def test_times_may_be_called_as_hs_ergb_calls_them(tmp_path: Path) -> None:
     assert [frame.t_ns for frame in source.frames()] == [0, 40_000] and source.warnings == []
 
 
+@pytest.mark.parametrize("step", [1000, 6667, 35_714, 999_999])
+@pytest.mark.parametrize("word", ["{}.0", "{:.18e}", "{}.25"])
+def test_microseconds_of_hs_ergb_may_be_written_with_decimals(tmp_path: Path, step: int, word: str) -> None:
+    """As numpy.savetxt and Time Lens's own writer have them; seconds in such a file stay seconds."""
+    write(tmp_path, ["1.png", "2.png", "3.png"])
+    text = "".join(f"{word.format(k * step)}\n" for k in range(3))
+    (tmp_path / "timestamp.txt").write_text(text)
+    source = open_source(tmp_path)
+    first, *others = [frame.t_ns for frame in source.frames()]
+    assert [t_ns - first for t_ns in others] == [1000 * step, 2000 * step]
+    assert ["taken for us" in warning for warning in source.warnings] == [True]
+    (tmp_path / "timestamp.txt").write_text("0.0\n0.5\n1e0\n")
+    source = open_source(tmp_path)
+    assert [frame.t_ns for frame in source.frames()] == [0, 500_000_000, 10**9] and source.warnings == []
+    (tmp_path / "timestamp.txt").write_text("# unit: s\n" + text)
+    assert next(open_source(tmp_path).frames(1)).t_ns >= 10**9 * step
+    (tmp_path / "timestamp.txt").rename(tmp_path / "timestamps.txt")
+    (tmp_path / "timestamps.txt").write_text(text)  # (by this name decimals are seconds)
+    assert next(open_source(tmp_path).frames(1)).t_ns >= 10**9 * step
+
+
 def test_start_skips_without_changing_what_follows(tmp_path: Path) -> None:
     write(tmp_path, [f"{k}.png" for k in range(5)], stamps="0\n40\n40\n80\n120\n")
     source = open_source(tmp_path)

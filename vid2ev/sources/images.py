@@ -34,6 +34,7 @@ from vid2ev.recording.exposures import KINDS
 from vid2ev.rig.lens_file import lens_in
 from vid2ev.sources.many import sources_in
 from vid2ev.sources.times import (
+    OF_ERGB,
     Clock,
     digest_of,
     expected_duration_s,
@@ -46,7 +47,7 @@ from vid2ev.sources.times import (
 from vid2ev.stream.frames import Colour, Frame
 from vid2ev.untrusted import json_of, read_text
 
-TIMESTAMPS, OF_ERGB = "timestamps.txt", "timestamp.txt"  # the other is what HS-ERGB and BS-ERGB call it
+TIMESTAMPS = "timestamps.txt"
 FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of frames that they have made
 
 

@@ -10,7 +10,8 @@ name its own.  Below a line `# start_us end_us` (or s, ms, ns) they are the inst
 opens and closes, and the first column counts.  The unit is
 
 * what a line `# unit: s` (or ms, us, ns), or just `# us`, or `# start_us end_us` says; without such a line
-* seconds, if any of the numbers has a decimal point or an exponent;
+* seconds, if any of the numbers has a decimal point or an exponent; but in `timestamp.txt`, where HS-ERGB and BS-ERGB
+  have microseconds, which are often written so (6667.0), those whose median spacing is 1000 or more are microseconds;
 * for whole numbers, by their median spacing: milliseconds below 100 (100 us would be 10 000 fps), nanoseconds from
   1 000 000 (1 s would be 1 fps), and microseconds between.
 """
@@ -34,9 +35,12 @@ from vid2ev.untrusted import check_file, first_line, read_array, read_lines
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
 GUESSED = " (by spacing)"  # after the name of a unit that nothing states
+OF_ERGB = "timestamp.txt"  # what HS-ERGB and BS-ERGB call it
+LEAST_OF_ERGB = 1000  # microseconds from frame to frame; seconds would be a quarter of an hour
 DECIMAL_COMMA = re.compile(r"(?:^|[\s;])([+-]?\d{1,50})(?:,(\d{1,50}))?\s*$")  # or whole numbers, in columns
 LONGEST_WORD = 100  # digits of a time
 T = TypeVar("T")
+Number = TypeVar("Number", int, Fraction)
 SLOWEST_HZ = 1e-6  # of frames: 12 days from one to the next
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
@@ -170,9 +174,13 @@ def read_timestamps(path: Path, images: Sequence[str] = ()) -> tuple[list[Fracti
             ) from error
     if unit is not None:
         return _in_seconds(values, unit, path), unit
-    whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
-    unit = unit_of_integers([int(value) for value in values]) if whole else "s"
-    return _in_seconds(values, unit, path), f"{unit}{GUESSED * whole}"
+    if all(re.fullmatch(r"[+-]?\d+", word) for word in words):
+        unit = unit_of_integers([int(value) for value in values])
+    elif path.name == OF_ERGB and _spacing(values) >= LEAST_OF_ERGB:
+        unit = "us"
+    else:
+        return _in_seconds(values, "s", path), "s"
+    return _in_seconds(values, unit, path), f"{unit}{GUESSED}"
 
 
 def _check_commas(lines: Sequence[str], path: Path) -> None:
@@ -261,9 +269,14 @@ def remarks_on_unit(unit: str | None, file: Path) -> list[str]:
 
 def unit_of_integers(values: Sequence[int]) -> str:
     """The unit of whole numbers without one, by their median spacing (rule above)."""
-    spacings = sorted(b - a for a, b in pairwise(values))
-    median = spacings[len(spacings) // 2] if spacings else 0
+    median = _spacing(values)
     return "ms" if median < 100 else "us" if median < 10**6 else "ns"
+
+
+def _spacing(values: Sequence[Number]) -> Number | int:
+    """The median from each to the next; 0 of fewer than two."""
+    spacings = sorted(b - a for a, b in pairwise(values))
+    return spacings[len(spacings) // 2] if spacings else 0
 
 
 def _in_seconds(values: Iterable[Fraction], unit: str, path: Path) -> list[Fraction]:
