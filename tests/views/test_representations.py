@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from voxel_grid import voxel_grid
 
@@ -163,6 +163,18 @@ def test_an_event_half_way_is_shared_by_two_bins() -> None:
     one = Events(np.array([625]), np.array([4], np.uint16), np.array([5], np.uint16), np.array([0], np.uint8))
     grid = voxel_grid(one, SIZE, 5, 0, 1000)
     assert grid[:, 5, 4].tolist() == [0, 0, -0.5, -0.5, 0]
+
+
+@settings(max_examples=200, deadline=None)
+@given(bins=st.integers(2, 12), start=st.integers(-(10**9), 10**15), step=st.integers(1, 10**6))
+@example(bins=7, start=0, step=2949)
+def test_an_event_right_at_a_bin_is_in_no_other(bins: int, start: int, step: int) -> None:
+    """Not even a 2e15th of it, which normalisation would take for a value."""
+    events = events_at(start + step * np.arange(bins))
+    grid = voxel_grid(events, SIZE, bins, start, start + (bins - 1) * step)
+    expected = np.zeros_like(grid)
+    expected[np.arange(bins), events.y, events.x] = signs(events)
+    np.testing.assert_array_equal(grid, expected)
 
 
 def test_normalised_grids_have_mean_0_and_deviation_1_where_they_are_not_0() -> None:

@@ -49,8 +49,7 @@ class Voxel:
         worth   what each counts for, float32 [N], in place of 1
         """
         check_within(events, self.size)
-        scale = (self.bins - 1) / (stop_us - start_us) if stop_us > start_us else 0.0
-        _add(events.t, events.x, events.y, events.p, worth, start_us, scale, self._grid)
+        _add(events.t, events.x, events.y, events.p, worth, start_us, stop_us - start_us, self._grid)
 
     def take(self, stop_us: int = 0) -> np.ndarray:
         """The grid of the events since the last call."""
@@ -81,10 +80,11 @@ def _normalised(grid: np.ndarray) -> np.ndarray:
 
 
 @cached
-def _add(t, x, y, p, worth, start_us, scale, grid):  # type: ignore[no-untyped-def]
+def _add(t, x, y, p, worth, start_us, span_us, grid):  # type: ignore[no-untyped-def]
     apart, last = grid.shape[0] == 2, grid.shape[1] - 1
     for i in range(len(t)):
-        at = min(max((t[i] - start_us) * scale, 0.0), float(last))
+        # (the product is a whole number, so that of an event right at a bin nothing is left for the next one)
+        at = min(max(float(t[i] - start_us) * last / span_us if span_us > 0 else 0.0, 0.0), float(last))
         bin_ = min(int(at), max(last - 1, 0))
         share = np.float32(at - bin_)
         sign = np.float32(1 if apart or p[i] else -1)
