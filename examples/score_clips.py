@@ -4,6 +4,7 @@
     python examples/score_clips.py                                   16 scenes and photographs that were put aside
     python examples/score_clips.py --scenes 0 VIDEO ...              4 parts of each video, 7 of 8 frames left out
     python examples/score_clips.py --method bridge --method RUN      a closed form beside a run of training
+    python examples/score_clips.py --coarser 3                       events of pixels that are 3 x 3 of the frames'
 
 Clips are those that `vid2ev train` validates with, each with a clean and a noisy event sensor.  PSNR against 255 and
 SSIM, means over all rebuilt frames; and by how much a method is above the first one in the clip in which that is least.
@@ -38,13 +39,25 @@ TRIED = ("bridge", "flow", "guided", "rrin_events_guided-tiny")
 @click.option("--parts", default=4, show_default=True, help="Of each video.")
 @click.option("--slowdown", default=1.0, show_default=True, help="Times slower than the world that videos play.")
 @click.option("--multiple", default=8, show_default=True, help="Frames for each key frame: 4, 8, 16, 32.")
+@click.option("--coarser", default=1, show_default=True, help="Pixels of frames, across, to one of events.")
 @click.option("--method", "tried", multiple=True, default=TRIED, show_default=True)
 def main(
-    videos: tuple[str, ...], scenes: int, parts: int, slowdown: float, multiple: int, tried: tuple[str, ...]
+    videos: tuple[str, ...],
+    scenes: int,
+    parts: int,
+    slowdown: float,
+    multiple: int,
+    coarser: int,
+    tried: tuple[str, ...],
 ) -> None:
     """Scores of methods on clips."""
     methods = {name: open_method(name if name in METHODS else str(pretrained.path_of(name))) for name in tried}
     settings = ClipSettings(slowdown=slowdown, multiples=(multiple,))
+    if coarser > 1:  # (at the same place, with frames that are whole pixels of events)
+        size = tuple(-(-side // coarser) * coarser for side in settings.size)
+        settings = ClipSettings(
+            **settings.model_dump() | {"rigs": 1, "coarser": [coarser], "baseline_mm": (0, 0), "size": size}
+        )
     click.echo("| clips | " + " | ".join(Path(name).name for name in tried) + " |")
     click.echo("| :-- |" + " --: |" * len(tried))
     for sensor in ("clean", "noisy"):

@@ -23,7 +23,7 @@ what stands still stays as it is.
 Where a pixel of the event camera looks at k x k pixels of the frames, C has luminance averaged over them and nothing
 finer.  So F and e are of luminance averaged alike, and c^2 in j^2 = e^2 - c^2 of doubts averaged alike, while c^2
 itself knows what C does not show.  What is taken over so many pixels is over k times as many, a is a / sqrt(k), and it
-is done twice: the second time motion is to I in place of C.
+is done twice: the second time motion is to I in place of C (`sight.py`).
 
 Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +3.5 dB and +0.044 with a clean sensor, +3.1 dB and
 +0.061 with a noisy one; 32 parts of eight real videos +1.7 dB and +0.011, +9.7 dB and +0.12; the worst part 0 and +1.6

@@ -86,6 +86,7 @@ class Samples(Drawn):
     frames     [2, C, h, w] float32, the two key frames: sRGB codes, 0 ... 1
     off_on     [2, S, h, w] float16: OFF and ON events of S sub-intervals, with what dead time hid, in the geometry of
                the frames
+    footprint  int64, pixels across of the frames that a pixel of the event camera looks at
     contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
     times      [N] float32, instants from 0 to 1, both left out, in order
     truth      [N, C, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it

@@ -21,6 +21,7 @@ from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
 from interp.methods.tiling import tiling_of
 from interp.own_codes import recoded, shown
+from interp.representation.carried import footprint_over
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import sha256
 
@@ -91,7 +92,8 @@ class OfMethod:
         gap = Gap(keys[0], keys[1], group.events.to(self.device))
         targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)
         height, width = keys.shape[-2:]
-        images = self.method.images(gap, targets, tiling_of(self.method, (width, height)))
+        tiling = tiling_of(self.method, (width, height), footprint=footprint_over(group.events, (height, width)))
+        images = self.method.images(gap, targets, tiling)
         coded = [code for some in images for code in self.protocol.coded(recoded(some, group.curve))]
         return [coded[k] for k in self.protocol.picked]
 

@@ -34,13 +34,11 @@ def choice(
     events: bool,
     where: str,
     device: torch.device | str,
-    coarse: bool = False,
     running: Running = PLAIN,
 ) -> Choice:
     """The method of a name or a file of weights, or without either the default.
 
     events   whether there are events; `where` is what has them or not, for people
-    coarse   whether a pixel of the event camera looks at several of the frames
     running  how a network is run
     Raises UsageError for both at once, and for a method that needs events where there are none.
     """
@@ -49,13 +47,11 @@ def choice(
     asked, why = f"network '{network}'" if network else f"method '{name}'", "as asked"
     network = pretrained.path_of(network) if network else None
     if not (name or network):
-        # (of frames alone there is a network, too, but it does not beat optical flow; and the one with events has not
-        # learnt from coarse ones, of which `guided` makes 1 dB more)
-        network = pretrained.first(pretrained.WITH_EVENTS) if events and not coarse else None
+        # (of frames alone there is a network, too, but it does not beat optical flow)
+        network = pretrained.first(pretrained.WITH_EVENTS) if events else None
         name = None if network else BEST if events else FALLBACK
-        seen = f"there are {'coarse ' * coarse}events" if events else "there are no events"
         best = "the network that comes with vid2ev" if network else "the best that needs no training"
-        why = f"{best}, since {seen}"
+        why = f"{best}, since there are {'events' if events else 'no events'}"
     method = open_method(str(network or name), device, running)
     if method.needs_events and not events:
         raise UsageError(f"{asked} needs events, and {where} has none; choose --method {FALLBACK}, or leave it out")

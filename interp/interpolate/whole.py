@@ -181,10 +181,10 @@ def prepared(
     if isinstance(take, OfStill):
         chosen = choice_of_one(method, network, str(source), running)
     else:
-        coarse = take.event_size is not None and footprint_of(take.size, take.event_size) > 1
-        chosen = choice(method, network, has_events, str(source), device, coarse, running)
+        chosen = choice(method, network, has_events, str(source), device, running)
     after = After(pretrained.path_of(hdr), has_events, device, tile, take.bright) if hdr else None
-    tiling = tiling_of(chosen.method, take.size, tile)
+    footprint = footprint_of(take.size, take.event_size) if take.event_size else 1
+    tiling = tiling_of(chosen.method, take.size, tile, footprint)
     needed = after is not None and after.needs_events
     fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, device, needed)
     return Ready(take, grid, fill, after, cuts == "hold", chosen.why, chosen.about)

@@ -14,8 +14,10 @@ import torch
 
 from interp.candidates.alone import alone, between
 from interp.candidates.bridge import highest_of
-from interp.candidates.guided import SEES_PX, flows_to, guided
+from interp.candidates.guided import SEES_PX
 from interp.candidates.ramps import in_doubt, ramps, risen
+from interp.candidates.sight import Sight
+from interp.light import Transfer
 from interp.methods.gap import Gap, Together
 from interp.methods.tiling import Tile, Tiling, part, strips, undivided
 from interp.representation.carried import footprint_over
@@ -23,7 +25,6 @@ from interp.representation.event_counts import EventCounts
 from vid2ev.errors import UsageError
 
 AT_ONCE_PX = 1 << 22  # pixels of images that are made at a time: some 100 bytes each
-ROUNDS = 2  # of guiding, where events are coarse
 Law = Callable[[Gap, torch.Tensor, Tiling], Iterator[torch.Tensor]]
 Form = Callable[..., torch.Tensor]  # (frame_0, frame_1, events, times, highest=)
 
@@ -80,30 +81,34 @@ def guided_by_ramps(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[t
 
 def _guided(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
     assert gap.events is not None
-    frames, footprint = _frames(gap), footprint_over(gap.events, tiling.size)
-    seen = _in_strips(_ramps_and_doubt, gap, times)
-    images = pictures = seen[None, :, :-1]
-    doubt, by_themselves = seen[None, :, -1:], alone(*frames, times[None])
-    for _ in range(1 if footprint == 1 else ROUNDS):
-        flows = flows_to(*frames, images, footprint=footprint)
-
-        def law(tile: Tile, flows: torch.Tensor = flows) -> torch.Tensor:
-            shown, motion, off, other = (each[(..., *tile.within)] for each in (pictures, flows, doubt, by_themselves))
-            corner = None if shown.shape == pictures.shape else (tile.top, tile.left)
-            carried = guided(*frames, shown, footprint=footprint, flows=motion, corner=corner)
-            return carried.image(shown, off, other, times[None])
-
-        images = tiling.cells(law, SEES_PX * footprint)
-    return images[0]
+    frames, seen = _frames(gap), _in_strips(ramps_and_doubt, gap, times)[None]
+    by_themselves, footprint = alone(*frames, times[None]), footprint_over(gap.events, tiling.size)
+    sight = Sight(frames, seen[:, :, :-1], seen[:, :, -1:], by_themselves, times[None], footprint)
+    image = in_cells(sight, tiling)
+    return image(sight.motion(image))[0]
 
 
-def _ramps_and_doubt(
-    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, times: torch.Tensor, highest: torch.Tensor
+def in_cells(sight: Sight, tiling: Tiling) -> Callable[[torch.Tensor], torch.Tensor]:
+    """What makes images of motion, cell by cell."""
+
+    def image(flows: torch.Tensor) -> torch.Tensor:
+        return tiling.cells(lambda tile: sight.image(flows, tile.within), SEES_PX * sight.footprint)
+
+    return image
+
+
+def ramps_and_doubt(
+    frame_0: torch.Tensor,
+    frame_1: torch.Tensor,
+    events: EventCounts,
+    times: torch.Tensor,
+    highest: torch.Tensor,
+    transfer: Transfer = "srgb",
 ) -> torch.Tensor:
     """Both, one channel after the other, [B, N, C + 1, H, W]."""
     found = risen(events, times)
-    pictures = ramps(frame_0, frame_1, events, times, found=found, highest=highest)
-    return torch.cat([pictures, in_doubt(frame_0, frame_1, found, times)], 2)
+    pictures = ramps(frame_0, frame_1, events, times, transfer, found=found, highest=highest)
+    return torch.cat([pictures, in_doubt(frame_0, frame_1, found, times, transfer)], 2)
 
 
 def _in_strips(form: Form, gap: Gap, times: torch.Tensor) -> torch.Tensor:

@@ -19,9 +19,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
+from typing import Any
 
 import torch
 
+from interp.candidates.guided import SEES_PX
 from interp.methods.gap import Gap, Method
 from interp.representation.carried import over
 from vid2ev.errors import UsageError
@@ -82,6 +84,10 @@ class Tiling:
         """Height and width of the frames [px]."""
         return self.down[-1][1], self.across[-1][1]
 
+    def continued(self, width: int, height: int) -> Tiling:
+        """The same of frames that go on to the right and below: so do the last tiles."""
+        return Tiling((*self.across[:-1], (self.across[-1][0], width)), (*self.down[:-1], (self.down[-1][0], height)))
+
     def cells(self, law: Callable[[Tile], torch.Tensor], halo_px: int = 0) -> torch.Tensor:
         """What `law` makes of tiles [..., h, w], side by side [..., H, W]; of each the halo is cut away."""
         (whole,) = self.all_cells(lambda tile: (law(tile),), halo_px)
@@ -129,8 +135,10 @@ def strips(width: int, height: int) -> Tiling:
     return Tiling(((0, width),), tuple((top, min(top + rows, height)) for top in range(0, height, rows)))
 
 
-def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
+def parse_tiling(text: str, size: tuple[int, int], multiple: int, sees_px: int = 0) -> Tiling:
     """The tiling of frames of a size (width, height): none, auto, or WxH; tiles begin at whole multiples.
+
+    sees_px   what a pixel must have around it: a quarter of overlaps, if that is not more than half a tile
 
     Raises UsageError for a text that says none of these, or for tiles smaller than `LEAST`.
     """
@@ -140,13 +148,20 @@ def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
     sides = (SIDE, SIDE) if text == "auto" else tuple(map(int, asked.groups())) if asked else (0, 0)
     if min(sides) < LEAST:
         raise UsageError(f"tile '{text}': expected none, auto, or WIDTHxHEIGHT of at least {LEAST}, such as 512x512")
-    across, down = (_parts(length, side, multiple) for length, side in zip(size, sides, strict=True))
+    across, down = (_parts(length, side, multiple, sees_px) for length, side in zip(size, sides, strict=True))
     return Tiling(across, down)
 
 
-def tiling_of(method: Method, size: tuple[int, int], tile: str = "auto") -> Tiling:
-    """The tiling that a method takes of frames of a size (width, height); see `parse_tiling`."""
-    return parse_tiling(tile, size, int(getattr(getattr(method, "network", None), "multiple", 2)))
+def tiling_of(method: Method, size: tuple[int, int], tile: str = "auto", footprint: int = 1) -> Tiling:
+    """The tiling that a method takes of frames of a size (width, height); see `parse_tiling`.
+
+    footprint   pixels across of the frames that a pixel of the event camera looks at
+    """
+    network: Any = getattr(method, "network", None)
+    if network is None:
+        return parse_tiling(tile, size, 2)
+    guided = getattr(network.spec, "guided", False)
+    return parse_tiling(tile, size, network.multiple, SEES_PX * footprint * guided)
 
 
 def part(gap: Gap, tile: Tile) -> Gap:
@@ -157,9 +172,9 @@ def part(gap: Gap, tile: Tile) -> Gap:
     return replace(gap, frame_0=frames[0], frame_1=frames[1], events=events)
 
 
-def _parts(length: int, side: int, multiple: int) -> tuple[tuple[int, int], ...]:
+def _parts(length: int, side: int, multiple: int, sees_px: int) -> tuple[tuple[int, int], ...]:
     """Where tiles of about a side begin and end on an axis."""
-    overlap = _up(min(OVERLAP, side // 4), multiple)
+    overlap = _up(max(min(OVERLAP, side // 4), min(4 * sees_px, side // 2)), multiple)
     if length <= max(side, overlap):
         return ((0, length),)
     count = ceil((length - overlap) / max(side - overlap, multiple))

@@ -17,7 +17,7 @@ were luminance, the closed form `guided` had 32.2 dB on 8 clips x8; so it has 34
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import nn
@@ -189,6 +189,16 @@ class FrameFed(nn.Module):
             raise UsageError(
                 f"events of {len(events.off_on)} pairs and {len(frame_0)} pairs of frames; stack one for each"
             )
+
+
+def joined(batches: Sequence[Interpolated], order: torch.Tensor) -> Interpolated:
+    """One batch of several, in another order."""
+
+    def of_all(name: str) -> torch.Tensor | None:
+        each = [getattr(batch, name) for batch in batches]
+        return None if each[0] is None else torch.cat(each)[order]
+
+    return Interpolated(**{field.name: of_all(field.name) for field in fields(Interpolated)})  # type: ignore[arg-type]
 
 
 def run(network: nn.Module, parts: Sequence[torch.Tensor]) -> torch.Tensor:

@@ -11,7 +11,6 @@ from interp.candidates.guided import (
     SHARP,
     agreement,
     carried_off_by,
-    flows_to,
     nearer,
     off_by,
     part_of,
@@ -19,6 +18,7 @@ from interp.candidates.guided import (
     shown_of,
 )
 from interp.candidates.ramps import Risen, in_doubt, ramps, risen
+from interp.candidates.sight import Sight
 from interp.light import Transfer
 from interp.networks.frame_fed import Pair, warped
 
@@ -39,6 +39,7 @@ class Guide:
     wrong    c^2 [B, N, 1, H, W]
     near     [B, 1, 1, H, W], 0 ... 1: where events are
     unsure   [B, N, 1, H, W], 0 ... 1: where events are, and frames carried by these flows are not to be believed
+    seen_wrong, footprint   c^2 averaged as coarse events see it, and k (`candidates.guided`)
     """
 
     transfer: Transfer
@@ -50,14 +51,16 @@ class Guide:
     wrong: torch.Tensor
     near: torch.Tensor
     unsure: torch.Tensor
+    seen_wrong: torch.Tensor
+    footprint: int
 
     def agreement(self, warps: torch.Tensor) -> torch.Tensor:
         """Logits [B, N, 2, H, W] of warps by how near their luminance is."""
-        return agreement(warps, self.shown, self.transfer)
+        return agreement(warps, self.shown, self.transfer, self.footprint)
 
     def nearer(self, carried: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """J [B, N, C, H, W], of J0 and D, and its logits [B, N, 1, H, W]."""
-        return nearer(carried, self.alone, self.shown, self.transfer)
+        return nearer(carried, self.alone, self.shown, self.transfer, self.footprint)
 
     def coloured(self, carried: torch.Tensor) -> torch.Tensor:
         """C' [B, N, C, H, W]: C in the colours of J."""
@@ -65,7 +68,7 @@ class Guide:
 
     def carried_off_by(self, agreed: torch.Tensor) -> torch.Tensor:
         """j^2 [B, N, 1, H, W] of the logits of J."""
-        return carried_off_by(agreed, self.wrong)
+        return carried_off_by(agreed, self.seen_wrong, self.footprint)
 
     def offs(self, off: torch.Tensor) -> torch.Tensor:
         """c and j [B, N, 2, H, W] of j^2, as a network takes them."""
@@ -82,24 +85,23 @@ class Guide:
         return start + share * (carried - start) + DEVIATIONS * spread * torch.tanh(said[:, :, :-1])
 
 
-def light_at(pair: Pair, times: torch.Tensor, transfer: Transfer, found: Risen | None = None) -> torch.Tensor:
-    """C [B, N, C, H, W] at times [B, N]: what motion is sought by."""
-    highest = None if pair.around is None else pair.around.highest
-    return ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found, highest=highest)
-
-
 def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer, gate: torch.Tensor) -> Guide:
     """What is known of a pair at times [B, N]; `gate` is that of the pair (`gate.py`)."""
+    frames, around, k = (pair.frame_0, pair.frame_1), pair.around, pair.events.footprint
     found = risen(pair.events, times)
-    light = light_at(pair, times, transfer, found)
-    flows = None if pair.around is None else pair.around.to_targets
-    flows = flows_to(pair.frame_0, pair.frame_1, light, transfer) if flows is None else flows
-    by_themselves = None if pair.around is None else pair.around.alone
+    light = ramps(
+        *frames, pair.events, times, transfer, found=found, highest=None if around is None else around.highest
+    )
+    doubt = in_doubt(*frames, found, times, transfer)
+    by_themselves = None if around is None else around.alone
     if by_themselves is None:
-        by_themselves = alone(pair.frame_0, pair.frame_1, times, transfer)
+        by_themselves = alone(*frames, times, transfer)
+    flows = None if around is None else around.to_targets
+    if flows is None:
+        flows = Sight(frames, light, doubt, by_themselves, times, k, transfer).motion()
     shown = shown_of(light, transfer)
-    wrong, _ = off_by(shown, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer))
+    wrong, seen_wrong = off_by(shown, doubt, k)
     near = gate[:, None]
-    carried = carried_off_by(agreement(warped(pair, flows, cubic=True), shown, transfer), wrong)
+    carried = carried_off_by(agreement(warped(pair, flows, cubic=True), shown, transfer, k), seen_wrong, k)
     unsure = near * part_of(carried, wrong).detach()
-    return Guide(transfer, light, shown, found, flows, by_themselves, wrong, near, unsure)
+    return Guide(transfer, light, shown, found, flows, by_themselves, wrong, near, unsure, seen_wrong, k)

@@ -1,7 +1,7 @@
 """Networks that take two frames learn to rebuild what is between them.
 
-A batch has, as of `interp.data.samples`, frames [B, 2, C, H, W] codes 0 ... 1, off_on [B, 2, S, H, W] and contrast
-[B, 2] of the events between them, times [B, N], and truth [B, N, C, H, W] codes at these.
+A batch has, as of `interp.data.samples`, frames [B, 2, C, H, W] codes 0 ... 1, off_on [B, 2, S, H, W], contrast [B, 2]
+and footprint [B] of the events between them, times [B, N], and truth [B, N, C, H, W] codes at these.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import torch
 from interp.losses import objectives
 from interp.losses.perceptual import Perceptual
 from interp.methods import METHODS, Gap, open_method
-from interp.networks.frame_fed import FrameFed, Interpolated
+from interp.networks.frame_fed import FrameFed, Interpolated, joined
 from interp.representation.event_counts import EventCounts
 from interp.train.batches import Batch
 from interp.train.learner import Learner
@@ -36,7 +36,16 @@ class FrameFedLearner(Learner):
         self.nearly_right = name == "rrin_light" or network.spec.guided  # before it learns
 
     def made(self, batch: Batch) -> Interpolated:
-        """What the network makes of a batch."""
+        """What the network makes of a batch: where it matters, of events that are as coarse as each other at a time."""
+        footprints = batch["footprint"]
+        if not self.network.spec.guided or bool((footprints == footprints[0]).all()):
+            return self._made(batch)
+        order = footprints.argsort(stable=True)
+        groups = order.split(footprints.unique(return_counts=True)[1].tolist())
+        made = [self._made({name: each[group] for name, each in batch.items()}) for group in groups]
+        return joined(made, order.argsort())
+
+    def _made(self, batch: Batch) -> Interpolated:
         first, last = batch["frames"].unbind(1)
         return self.network(first, last, batch["times"], events_of(batch))
 
@@ -86,8 +95,8 @@ class FrameFedLearner(Learner):
 
 
 def events_of(batch: Batch) -> EventCounts:
-    """The events of a batch."""
-    return EventCounts(batch["off_on"], batch["contrast"])
+    """The events of a batch, all as coarse as those of the first."""
+    return EventCounts(batch["off_on"], batch["contrast"], int(batch["footprint"][0]))
 
 
 def gap_of(clip: Batch) -> Gap:

@@ -248,7 +248,7 @@ def test_a_network_says_how_much_to_believe_and_what_is_missing_where_events_are
     start, carried, r = torch.rand(3, 1, 2, 3, 7, 9)
     unused = torch.zeros(0)
     found = risen(EventCounts.none(1, (7, 9)), torch.tensor([[0.5, 0.6]]))
-    guide = Guide("srgb", unused, unused, found, unused, unused, c2, near, near)
+    guide = Guide("srgb", unused, unused, found, unused, unused, c2, near, near, c2, 1)
     made = guide.image(start, carried, j2, torch.cat([r, n], 2))
     m = c2 / (c2 + j2 * torch.exp(-(n * near).clamp(-10, 10)) + 0.003**2)
     s = (c2 * j2 / (c2 + j2 + 0.003**2)).sqrt()
@@ -307,11 +307,16 @@ def test_any_size_will_do(size: tuple[int, int]) -> None:
     assert flows.any() == (min(size) >= 16)
 
 
-def test_a_fresh_guided_network_is_the_closed_form() -> None:
-    first, last, events = shifted(0), shifted(5), moving([5 * k / STEPS for k in range(STEPS + 1)])
+@pytest.mark.parametrize("coarser", [1, 2, 3])
+@pytest.mark.parametrize(("name", "options"), [("rrin_events_guided", {}), ("rrin_slomo_events", {"flow": "guided"})])
+def test_a_fresh_guided_network_is_the_closed_form(name: str, options: dict[str, str], coarser: int) -> None:
+    """However coarse events are."""
+    first, last = (each[..., :48, :48] for each in (shifted(0), shifted(5)))
+    fine = moving([5 * k / STEPS for k in range(STEPS + 1)])
+    events = EventCounts(fine.off_on[..., :48, :48], fine.contrast).pooled(coarser)
     times = torch.tensor([0.25, 0.5])
     with torch.no_grad():
-        images = make("rrin_events_guided")(first, last, times, events).images[0]
+        images = make(name, **options)(first, last, times, events).images[0]
     expected = open_method("guided").between(Gap(first[0], last[0], events), times)
     torch.testing.assert_close(images, expected, atol=1e-5, rtol=0)
 

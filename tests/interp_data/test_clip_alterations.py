@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from torch.utils.data import default_collate
 
 from interp.candidates.bridge import bridge
 from interp.data import alter
@@ -68,7 +69,9 @@ def test_a_part_has_its_own_events(coarser: int) -> None:
 def test_recordings_of_finer_and_coarser_events_make_one_batch() -> None:
     settings = ClipSettings(recordings=1, recording_folders=("somewhere",))
     clips = [clip_of(coarser=coarser) for coarser in (1, 2, 3)]
-    batch = torch.stack([tensors(clip, settings)["off_on"] for clip in clips])
+    made = default_collate([tensors(clip, settings) for clip in clips])
+    assert made["footprint"].tolist() == [1, 2, 3]
+    batch = made["off_on"]
     np.testing.assert_array_equal(batch[0], clips[0].off_on)  # (as many as were counted)
     np.testing.assert_array_equal(batch[2, ..., 1::3, 1::3], clips[2].off_on)  # (at the middle of their pixels)
 

@@ -21,7 +21,6 @@ from small_takes import SIZE, STEP_US, images, moving, recording, strange, textu
 from interp import pretrained
 from interp.commands.interpolate import interpolate as command
 from interp.interpolate import frames, interpolate
-from interp.interpolate.choice import choice
 from interp.interpolate.fill import Filled
 from interp.interpolate.instants import Instant
 from interp.interpolate.pictures import Pictures
@@ -29,7 +28,6 @@ from interp.interpolate.take import Options, open_take
 from interp.methods import METHODS, open_method
 from interp.networks import make
 from interp.own_codes import shown
-from interp.representation.carried import footprint_of
 from interp.weights import save
 from vid2ev import open_source
 from vid2ev.errors import DataError, UsageError
@@ -292,13 +290,6 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
     assert weights
     for sentence, name in zip(said, ("flow", weights.stem), strict=True):
         assert sentence.startswith(name) and "since there are" in sentence
-
-
-def test_of_coarse_events_the_closed_form_makes_more() -> None:
-    assert choice(None, None, True, "here", "cpu").method.name == Path(pretrained.WITH_EVENTS[-1]).stem
-    found = choice(None, None, True, "here", "cpu", coarse=True)
-    assert found.method.name == "guided" and "coarse events" in found.why
-    assert footprint_of((384, 288), (128, 96)) == 3 and footprint_of((320, 180), (640, 480)) == 1
 
 
 @pytest.mark.parametrize(

@@ -11,14 +11,17 @@ from typing import Any
 import pytest
 import torch
 from small_takes import images, moving
+from torch.nn import functional as F
 from torch.utils._python_dispatch import TorchDispatchMode
 
+from interp.candidates import sight
 from interp.candidates.calibrated import calibrated
 from interp.interpolate.after import After
 from interp.interpolate.whole import frames
+from interp.light import luminance, to_light
 from interp.methods import METHODS, Gap, closed_forms, of_networks, open_method, tiling
 from interp.methods.of_networks import OfFrames
-from interp.methods.tiling import LEAST, Tiling, parse_tiling, part
+from interp.methods.tiling import LEAST, Tiling, parse_tiling, part, tiling_of
 from interp.networks import make
 from interp.representation.carried import at_places, carried, footprint_over, over, places_over
 from interp.representation.event_counts import EventCounts
@@ -31,7 +34,7 @@ TIMES = torch.tensor([0.25, 0.5, 0.75])
 
 def gap(event_size: tuple[int, int] = SIZE) -> Gap:
     coarse = torch.rand(2, 3, 26, 34)
-    frames = torch.nn.functional.interpolate(coarse, SIZE[::-1], mode="bilinear", align_corners=False)
+    frames = F.interpolate(coarse, SIZE[::-1], mode="bilinear", align_corners=False)
     counts = torch.poisson(torch.full((1, 2, 8, *event_size[::-1]), 0.05))
     return Gap(frames[0], frames[1], EventCounts(counts, torch.tensor([[0.15, 0.2]])))
 
@@ -234,24 +237,56 @@ def test_motion_is_that_of_the_whole(
     monkeypatch: pytest.MonkeyPatch, name: str, options: dict[str, Any], event_size: tuple[int, int]
 ) -> None:
     """Fresh networks are closed forms: what is left to differ is motion, colours, and how bright light may be."""
-    monkeypatch.setattr(closed_forms, "ROUNDS", 1)  # (two of coarse events: below)
+    monkeypatch.setattr(sight, "AGAIN", 0)  # (once more of coarse events: below)
     network = None if name in METHODS else make(name, **options).eval()
     method = open_method(name) if network is None else OfFrames(name, network, needs_events=name != "rrin_events_light")
     whole = gap(event_size)
     whole = replace(whole, frame_1=2 * whole.frame_0.roll((9, 37), (1, 2)))  # (above white here and there)
-    tiling = parse_tiling("128x128", SIZE, 2 if network is None else network.multiple)
-    assert len(tiling) > 1
-    made, at_once = method.between(whole, TIMES, tiling), method.between(whole, TIMES)
+    tiles = tiling_of(method, SIZE, "192x192", 1 if event_size == SIZE else 2)
+    assert len(tiles) > 1
+    made, at_once = method.between(whole, TIMES, tiles), method.between(whole, TIMES)
     assert float((at_once - whole.frame_0).abs().mean()) > 0.01
     assert float((made - at_once).abs().max()) < 2e-4
 
 
-def test_motion_that_is_sought_twice_is_that_of_the_whole_but_where_nobody_knows_it() -> None:
+def of_motion(coarser: int) -> Gap:
+    """A texture that moves by (8, 5) px, and what coarse pixels see of it."""
+    width, height = SIZE
+    texture = F.interpolate(torch.rand(1, 3, 30, 38), (height + 32, width + 32), mode="bicubic").clamp(0.05, 0.95)
+    frames, levels = list[torch.Tensor](), list[torch.Tensor]()
+    for k in range(17):
+        moved = torch.tensor([[[1, 0, k / (width + 32)], [0, 1, 5 / 8 * k / (height + 32)]]])
+        frame = F.grid_sample(texture, F.affine_grid(moved, list(texture.shape), False), "bicubic", "border", False)
+        frames.append(frame[0, :, 16:-16, 16:-16].clamp(0.03, 1))
+        seen = F.avg_pool2d(torch.log(luminance(to_light(frames[-1], "srgb")) + 1e-3), coarser)
+        levels.append((seen[0] / 0.15).round())
+    changes = torch.stack(levels).diff(dim=0)
+    counts = torch.stack([(-changes).clamp(min=0), changes.clamp(min=0)])[None]
+    return Gap(frames[0], frames[-1], EventCounts(counts, torch.full((1, 2), 0.15)))
+
+
+@pytest.mark.parametrize("coarser", [2, 4])
+@pytest.mark.parametrize("name", ["guided", "rrin_events_guided", "rrin_slomo_events"])
+def test_motion_that_is_sought_twice_is_that_of_the_whole_but_where_nobody_knows_it(name: str, coarser: int) -> None:
     """The second time to 8 bits of images that differ by 1e-6, of which flow that is not sure makes another one."""
-    method, whole = open_method("guided"), gap((136, 104))
-    whole = replace(whole, frame_1=2 * whole.frame_0.roll((2, 5), (1, 2)))
-    off = (method.between(whole, TIMES, parse_tiling("128x128", SIZE, 2)) - method.between(whole, TIMES)).abs()
-    assert float((off > 1 / 255).float().mean()) < 1e-3
+    options = {"flow": "guided"} if name == "rrin_slomo_events" else {}
+    network = None if name in METHODS else make(name, **options).eval()
+    method = open_method(name) if network is None else OfFrames(name, network, needs_events=True)
+    torch.manual_seed(0)
+    whole, tiles = of_motion(coarser), tiling_of(method, SIZE, "192x192", coarser)
+    assert len(tiles) > 1
+    off = (method.between(whole, TIMES, tiles) - method.between(whole, TIMES)).abs()
+    assert float((off > 1 / 255).float().mean()) < 2e-4
+
+
+@pytest.mark.parametrize(("footprint", "overlap"), [(1, 128), (2, 128), (4, 160), (9, 360), (20, 512)])
+def test_of_coarse_events_tiles_overlap_by_as_much_more_as_these_are_asked_over(footprint: int, overlap: int) -> None:
+    """But of networks that do not ask."""
+    guided, light = (OfFrames(name, make(name), True) for name in ("rrin_events_guided", "rrin_events_light"))
+    one, other, *_ = tiling_of(guided, (8192, 1024), "1024x1024", footprint)
+    assert 0 <= one.right - other.left - overlap < guided.network.multiple
+    one, other, *_ = tiling_of(light, (8192, 1024), "1024x1024", footprint)
+    assert one.right - other.left == 128
 
 
 @pytest.mark.parametrize("name", ["rrin_events_guided", "rrin_events_light"])

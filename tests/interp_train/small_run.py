@@ -40,6 +40,7 @@ def sample(number: int) -> dict[str, torch.Tensor]:
     return {
         "frames": frames[[0, -1]],
         "off_on": off_on,
+        "footprint": torch.tensor(1),
         "contrast": torch.full((2,), 0.15),
         "times": inner.float() / STEPS,
         "truth": frames[inner],

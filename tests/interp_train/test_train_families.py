@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 import torch
 from small_run import SIDE, sample
+from torch.utils.data import default_collate
 
 from interp.light import grey
 from interp.networks import make
+from interp.networks.frame_fed import Interpolated
 from interp.train.event_fed import EventFedLearner, aligned, windows
 from interp.train.flow import FlowLearner
 from interp.train.frame_fed import FrameFedLearner
@@ -60,8 +63,25 @@ def batch(name: str, side: int = 2 * SIDE, colours: int = 3) -> dict[str, torch.
     off_on = torch.poisson(torch.full((2, 9, side, side), 0.2), torch.Generator().manual_seed(2)).to(torch.uint8)
     codes = (truth - 0.2).clamp(0, 0.5) / 0.5
     sensor = {"clipped": codes, "range": torch.tensor([0.2, 0.7])}
-    sequence = {"truth": truth, "off_on": off_on, "contrast": torch.full((2,), 0.15)} | sensor
+    events = {"off_on": off_on, "footprint": torch.tensor(1), "contrast": torch.full((2,), 0.15)}
+    sequence = {"truth": truth} | events | sensor
     return {key: part[None] for key, part in with_flows(sequence).items()}
+
+
+@pytest.mark.parametrize("name", ["rrin_events_guided", "rrin_events_light"])
+def test_of_a_batch_each_is_made_as_if_alone_however_coarse_its_events_are(name: str) -> None:
+    samples = [sample(number) | {"footprint": torch.tensor(k)} for number, k in enumerate((2, 1, 3, 1, 2))]
+    torch.manual_seed(0)
+    learning = FrameFedLearner(name, make(name, zero_heads=False), Recipe(steps=8), Schedule(0, 1.0, ((0, 8),)))
+    with torch.no_grad():
+        made = learning.made(default_collate(samples))
+        for number, one in enumerate(samples):
+            alone = learning.made({key: part[None] for key, part in one.items()})
+            for field in fields(Interpolated):
+                ours, wanted = getattr(made, field.name), getattr(alone, field.name)
+                assert (ours is None) == (wanted is None)
+                if wanted is not None:
+                    torch.testing.assert_close(ours[number : number + 1], wanted, atol=1e-5, rtol=1e-5)
 
 
 @pytest.mark.parametrize(("name", "colours"), [*((name, 3) for name in KINDS), *((name, 1) for name in GREY)])

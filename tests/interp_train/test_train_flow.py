@@ -26,6 +26,7 @@ def moving() -> dict[str, torch.Tensor]:
     sample = {
         "frames": torch.stack([pictures[0], pictures[2]]),
         "off_on": torch.zeros(2, 8, 64, 64, dtype=torch.uint8),
+        "footprint": torch.tensor(1),
         "contrast": torch.full((2,), 0.15),
         "times": torch.tensor([0.5]),
         "truth": pictures[1][None],

@@ -71,7 +71,7 @@ def test_samples_are_those_of_three_colours_in_grey(tmp_path: Path) -> None:
         assert {name: part.shape for name, part in grey.items() if name not in ("frames", "truth")} == {
             name: part.shape for name, part in colours.items() if name not in ("frames", "truth")
         }
-        assert all(torch.equal(grey[name], colours[name]) for name in ("off_on", "contrast", "times"))
+        assert all(torch.equal(grey[name], colours[name]) for name in ("off_on", "footprint", "contrast", "times"))
         for name in ("frames", "truth"):
             codes = (255 * colours[name]).round().byte().movedim(1, -1).numpy()
             clip = Clip(codes, codes, np.zeros((2, 1, 32, 32)), (0.2, 0.2), 1, {})
