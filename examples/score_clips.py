@@ -52,12 +52,9 @@ def main(
 ) -> None:
     """Scores of methods on clips."""
     methods = {name: open_method(name if name in METHODS else str(pretrained.path_of(name))) for name in tried}
-    settings = ClipSettings(slowdown=slowdown, multiples=(multiple,))
-    if coarser > 1:  # (at the same place, with frames that are whole pixels of events)
-        size = tuple(-(-side // coarser) * coarser for side in settings.size)
-        settings = ClipSettings(
-            **settings.model_dump() | {"rigs": 1, "coarser": [coarser], "baseline_mm": (0, 0), "size": size}
-        )
+    side = -(-128 // coarser) * coarser
+    rig = {"rigs": 1.0, "coarser": (coarser,), "baseline_mm": (0.0, 0.0), "size": (side, side)} if coarser > 1 else {}
+    settings = ClipSettings(slowdown=slowdown, multiples=(multiple,), **rig)
     click.echo("| clips | " + " | ".join(Path(name).name for name in tried) + " |")
     click.echo("| :-- |" + " --: |" * len(tried))
     for sensor in ("clean", "noisy"):

@@ -18,7 +18,7 @@ from interp import pretrained
 from interp.light import to_codes, to_light
 from interp.methods.gap import Gap
 from interp.methods.of_networks import OfFrames, of_weights
-from interp.methods.tiling import tiling_of
+from interp.methods.tiling import tiling_for
 from vid2ev import Frame
 from vid2ev.errors import UsageError
 from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
@@ -68,8 +68,7 @@ class NetUpsampling:
         shares = self._upload.tensor(np.array([(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns], np.float32))
         first, last = (self._upload.light(frame.light) for frame in (a, b))
         gap = Gap(_codes(first), _codes(last), None)
-        height, width = a.light.shape[:2]
-        made = self._method.images(gap, shares, tiling_of(self._method, (width, height)))
+        made = self._method.images(gap, shares, tiling_for(self._method, gap))
         endless = first.isposinf() & last.isposinf()  # (of which a sensor sees the greatest light there is)
         for t_ns, image in zip(times_ns, (image for images in made for image in images), strict=True):
             light: Any = _light(image, a.light.ndim).masked_fill(endless, torch.inf)

@@ -24,7 +24,7 @@ from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.gap import Together
 from interp.methods.of_networks import OfEvents, OfFrames, of_weights
 from interp.methods.running import PLAIN, PRECISIONS, Running, compiles
-from interp.methods.tiling import Tiling, parse_tiling
+from interp.methods.tiling import Tiling, tiling_for
 from interp.networks.spec import BASES
 
 KINDS = (pretrained.WITH_EVENTS, pretrained.OF_FRAMES, pretrained.OF_EVENTS)
@@ -55,7 +55,6 @@ class Tiled(Together):
 
     method: Method
     tile: str
-    multiple: int
 
     name, needs_events, sequential = "tiled", True, False
 
@@ -65,8 +64,7 @@ class Tiled(Together):
 
     def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
-        height, width = gap.frame_0.shape[-2:]
-        return self.method.images(gap, times, parse_tiling(self.tile, (width, height), self.multiple))
+        return self.method.images(gap, times, tiling_for(self.method, gap, self.tile))
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,10 +114,9 @@ def _otherwise(plain: OfFrames | OfEvents, asked: str, device: str) -> Iterator[
             yield Way(f"{name}, {precision}", "precision", coarse, f"{asked} --precision {precision}")
     if not isinstance(plain, OfFrames):
         return
-    network = plain.network
-    yield Way(f"{name}, tiles", "tiles", lambda: Tiled(plain, TILE, network.multiple), f"{asked} --tile {TILE}")
+    yield Way(f"{name}, tiles", "tiles", lambda: Tiled(plain, TILE), f"{asked} --tile {TILE}")
     yield Way(f"{name}, motion anew", "motion", lambda: Anew(plain))
-    for size in list(BASES)[list(BASES).index(network.spec.size) + 1 :]:
+    for size in list(BASES)[list(BASES).index(plain.network.spec.size) + 1 :]:
         yield Way(f"{name}, of size {size}", "larger", partial(_untrained, plain, size), scored=False)
 
 

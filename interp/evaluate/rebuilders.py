@@ -19,9 +19,8 @@ from interp.evaluate.group import Footage, Group
 from interp.evaluate.naming import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
-from interp.methods.tiling import tiling_of
+from interp.methods.tiling import tiling_for
 from interp.own_codes import recoded, shown
-from interp.representation.carried import footprint_over
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import sha256
 
@@ -91,9 +90,7 @@ class OfMethod:
         keys = as_tensor(shown(group.keys, group.curve)).to(self.device)
         gap = Gap(keys[0], keys[1], group.events.to(self.device))
         targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)
-        height, width = keys.shape[-2:]
-        tiling = tiling_of(self.method, (width, height), footprint=footprint_over(group.events, (height, width)))
-        images = self.method.images(gap, targets, tiling)
+        images = self.method.images(gap, targets, tiling_for(self.method, gap))
         coded = [code for some in images for code in self.protocol.coded(recoded(some, group.curve))]
         return [coded[k] for k in self.protocol.picked]
 

@@ -25,7 +25,7 @@ import torch
 
 from interp.candidates.guided import SEES_PX
 from interp.methods.gap import Gap, Method
-from interp.representation.carried import over
+from interp.representation.carried import footprint_over, over
 from vid2ev.errors import UsageError
 
 WHOLE_PX = 1 << 20
@@ -162,6 +162,13 @@ def tiling_of(method: Method, size: tuple[int, int], tile: str = "auto", footpri
         return parse_tiling(tile, size, 2)
     guided = getattr(network.spec, "guided", False)
     return parse_tiling(tile, size, network.multiple, SEES_PX * footprint * guided)
+
+
+def tiling_for(method: Method, gap: Gap, tile: str = "auto") -> Tiling:
+    """The tiling that a method takes of the frames of a gap; see `tiling_of`."""
+    height, width = gap.frame_0.shape[-2:]
+    footprint = 1 if gap.events is None else footprint_over(gap.events, (height, width))
+    return tiling_of(method, (width, height), tile, footprint)
 
 
 def part(gap: Gap, tile: Tile) -> Gap:

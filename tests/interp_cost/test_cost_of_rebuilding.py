@@ -223,7 +223,7 @@ def test_what_is_done_once_per_gap_may_be_done_for_each_frame() -> None:
 
 def test_tiles_are_those_that_interpolation_makes() -> None:
     method, times, wide = open_method("linear"), torch.tensor([0.3]), gap(200, 150)
-    made = Tiled(method, "64x64", 2).between(wide, times)
+    made = Tiled(method, "64x64").between(wide, times)
     torch.testing.assert_close(made, method.between(wide, times), atol=1e-6, rtol=0)
 
 
