@@ -20,17 +20,20 @@ from typing import Any
 
 import click
 import torch
+from pydantic import BaseModel
 from safetensors import safe_open
 from torch import nn
 
 from interp import pretrained, weights
 from interp.data.samples import SampleSettings
+from interp.data.settings import ClipSettings
 from interp.train.curves import read_curve
 from interp.train.job import Job
 from interp.train.learner import means, overall
 from interp.train.made_of import learner_of, validation_of
 from interp.train.scores import Scores
 
+FILES = ("video_files", "recording_folders")  # of `--data`
 SCORES = {
     "hdr": "PSNR in decades of light, beyond the range of the frames / SSIM",
     "firenet": "PSNR-255 / SSIM, brought to the truth's mean and contrast",
@@ -109,10 +112,12 @@ def _card(
     reports: tuple[Path, ...],
 ) -> str:
     recipe, clips = job["recipe"], job["clips"]
-    usual = SampleSettings().model_dump(mode="json")
-    samples = {name: value for name, value in job["samples"].items() if value != usual[name]}
-    changed = {"network": job["options"], "samples": samples}
-    set_to = "".join(f" --set {part}.{name}={value}" for part, of in changed.items() for name, value in of.items())
+    changed = {
+        "network": job["options"],
+        "samples": _unusual(job["samples"], SampleSettings()),
+        "clips": {name: value for name, value in _unusual(clips, ClipSettings()).items() if name not in FILES},
+    }
+    set_to = "".join(f" --set '{part}.{name}={value}'" for part, of in changed.items() for name, value in of.items())
     steps = read_curve(run / "validation.csv")[-1]["step"]
     videos = ", ".join(Path(name).name for name in job["validation"]["videos"])
     begun = ", ".join(f"{part or 'all'} of sha256 {digest}" for part, digest in job.get("starts", {}).items())
@@ -132,8 +137,8 @@ def _card(
         "- **Data**: events simulated while training, of "
         f"{clips['scenes'] / total:.0%} rendered scenes ({', '.join(clips['scene_names'])}), "
         f"{clips['photographs'] / total:.0%} photographs in motion ({', '.join(clips['textures'])}) and "
-        f"{clips['videos'] / total:.0%} real videos ({', '.join(trained_on) or 'none'}); frames made of each key frame:"
-        f" {', '.join(f'x{k}' for k in clips['multiples'])};"
+        f"{clips['videos'] / total:.0%} real videos ({', '.join(trained_on) or 'none'});{_rigs(clips)} frames made of"
+        f" each key frame: {', '.join(f'x{k}' for k in clips['multiples'])};"
         f" thresholds {clips['sensors']['threshold'][0]} to {clips['sensors']['threshold'][1]} nat.",
         f"- **Validated on, never trained on**: {job['validation']['clips']} clips of scenes and photographs that"
         f" training does not have, and real ones of {videos or 'no videos'}, each with a clean and a noisy sensor.",
@@ -146,6 +151,20 @@ def _card(
         summary = json.loads((report / "summary.json").read_text())
         lines += ["", f"## {report.name}", "", *_scores(summary)]
     return "\n".join(lines) + "\n"
+
+
+def _unusual(settings: dict[str, Any], usual: BaseModel) -> dict[str, Any]:
+    """Those that are not what they usually are."""
+    of_all = usual.model_dump(mode="json")
+    return {name: value for name, value in settings.items() if value != of_all[name]}
+
+
+def _rigs(clips: dict[str, Any]) -> str:
+    """Of event cameras that are not the frame camera's pixels."""
+    if not clips["rigs"]:
+        return ""
+    coarser, (least, most) = ", ".join(map(str, clips["coarser"])), clips["baseline_mm"]
+    return f" {clips['rigs']:.0%} with events of pixels {coarser} times as large, {least:g} to {most:g} mm beside;"
 
 
 def _said_of(share: float) -> str:
