@@ -12,11 +12,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import av
 import click
@@ -424,6 +424,39 @@ def test_what_decides_light_and_sensors_can_be_said_to_all_that_look_at_them(nam
     recipes, there = {"sensor", "overrides", *Recipe.options()}, {option.name for option in command.params}
     assert recipes - there == left_out
     assert name != "convert" or {*Outputs.options()} <= there
+
+
+def test_the_choices_of_options_are_those_that_there_are() -> None:
+    """Commands list them themselves, so that `--help` loads nothing; few have no list of their own elsewhere."""
+    from interp.data.dataset_spec import DatasetSpec, Layout
+    from interp.evaluate.protocol import Rounding, Times
+    from interp.interpolate.destination import Kind
+    from interp.methods.running import PRECISIONS
+    from interp.networks.spec import BASES
+    from vid2ev.physics.bayer import PATTERNS
+    from vid2ev.rig.calibration import FORMATS, UNITS_M
+    from vid2ev.scenes.picture_writing import WRITERS
+    from vid2ev.seen.recipe import CUTS
+    from vid2ev.sensors.devices import DEVICES
+    from vid2ev.views.on_disk import KINDS
+
+    known: dict[str, Iterable[str]] = {
+        "convert cuts": CUTS, "cost cuts": CUTS, "plan cuts": CUTS, "convert frames": KINDS, "scene frames": WRITERS,
+        "bayer": PATTERNS, "device": DEVICES, "unit": UNITS_M, "calibration name": ("rig", *FORMATS),
+        "layout": get_args(Layout), "preset": get_args(DatasetSpec.model_fields["preset"].annotation),
+        "times": get_args(Times), "rounding": get_args(Rounding), "format": get_args(Kind), "precision": PRECISIONS,
+        "size": BASES,
+    }  # fmt: skip
+    context, alone = click.Context(main), set()
+    for name in main.list_commands(context):
+        command = main.get_command(context, name)
+        assert command is not None
+        for option in command.params:
+            if isinstance(option.type, click.Choice):
+                there = known.get(f"{name} {option.name}", known.get(str(option.name)))
+                alone |= {f"{name} {option.name}"} if there is None else set()
+                assert there is None or {*option.type.choices} == {*there}, f"{name} {option.name}"
+    assert alone == {"compare align", "interpolate cuts", "scene renderer", "train clips_on"}
 
 
 def test_sources_that_are_none() -> None:

@@ -10,10 +10,10 @@ from click.testing import CliRunner, Result
 from drawn_rigs import differences, pair
 
 from vid2ev.commands import Commands
-from vid2ev.commands.calibration import NAMES, calibration
+from vid2ev.commands.calibration import calibration
 from vid2ev.commands.init import init
 from vid2ev.errors import DataError, UsageError
-from vid2ev.rig.calibration import FORMATS, UNITS_M, read_calibration, write_calibration
+from vid2ev.rig.calibration import FORMATS, read_calibration, write_calibration
 from vid2ev.rig.rig_file import EXAMPLE, read_rig, write_rig
 
 
@@ -119,9 +119,3 @@ def test_refusals_are_one_line_and_leave_nothing(exit_code: int, sentence: str, 
     line = refused.stderr.strip()
     assert line.startswith("error: ") and sentence in line and "\n" not in line and refused.stdout == ""
     assert sorted(Path().iterdir()) == before
-
-
-def test_the_options_name_all_that_there_is() -> None:
-    options = {option.name: option.type for command in (init, calibration) for option in command.params}
-    assert isinstance(options["unit"], click.Choice) and list(options["unit"].choices) == list(UNITS_M)
-    assert set(NAMES) == {"rig", *FORMATS}
