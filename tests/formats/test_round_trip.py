@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -31,7 +32,7 @@ from vid2ev.stream.events import Events
 
 WRITABLE = [name for name in FORMATS if format_named(name).write]
 TEXT = {"rpg": "{0} {1}\n", "dat": "% Width {0}\n", "aedat4": ">{0}<", "evt2": "y {0}x{1}", "evt3": "y {0}x{1}"}
-STATED: dict[str, Callable[[int, int], bytes]] = {  # the size, by format
+BYTES: dict[str, Callable[[int, int], bytes]] = {  # the size, by format
     **{name: lambda *size, text=text: text.format(*size).encode() for name, text in TEXT.items()},  # type: ignore[misc]
     **{name: lambda width, height: struct.pack("<II", height, width) for name in ("ros1", "ros2")},
 }
@@ -70,14 +71,27 @@ def test_the_format_that_is_named_instead_of_one_that_cannot_hold_it_can(name: s
                     check_holds(format_named(instead[1]), size, duration_us, start_us)
 
 
-@pytest.mark.parametrize("name", STATED)
+def narrow(path: Path, name: str, size: tuple[int, int], width: int) -> None:
+    """Have a file of this size say another width."""
+    if name == "npz":
+        with np.load(path) as found:
+            arrays = dict(found)
+        np.savez(path, **arrays | {"size": np.array([width, size[1]])})
+    elif name in ("hdf5", "v2e-hdf5"):
+        with h5py.File(path, "r+") as file:
+            file.attrs["width"] = file.attrs["width"].dtype.type(width)
+    else:
+        old, new = BYTES[name](*size), BYTES[name](width, size[1])
+        assert old in path.read_bytes() and len(old) == len(new)
+        path.write_bytes(path.read_bytes().replace(old, new))
+
+
+@pytest.mark.parametrize("name", [name for name in WRITABLE if "size" in format_named(name).keeps])
 def test_events_outside_of_the_sensor_are_left_out_and_counted(tmp_path: Path, name: str) -> None:
     """In all formats alike, of a sensor that says it is narrower than where its events are."""
     recording = sparse()
     path, events = written(format_named(name), recording, tmp_path), all_events(recording)
-    old, new = (STATED[name](width, recording.size[1]) for width in (recording.size[0], 100))
-    assert old in path.read_bytes() and len(old) == len(new)
-    path.write_bytes(path.read_bytes().replace(old, new))
+    narrow(path, name, recording.size, 100)
     inside = events.select(events.x < 100)
     assert 0 < len(inside) < len(events)
     said = f"{len(events) - len(inside)} events outside of the 100x{recording.size[1]} sensor are left out"
@@ -86,6 +100,10 @@ def test_events_outside_of_the_sensor_are_left_out_and_counted(tmp_path: Path, n
         assert_same(Events.concatenate(file.events()), inside)
         assert file.warnings == [said]
     assert survey(open_events(path)).count == len(inside) == describe_events(path)["events"]
+    start_us, stop_us = int(events.t[100]), int(events.t[-100])
+    part = list(read_events(path, start_us, stop_us, block=3))
+    assert_same(Events.concatenate(part), inside.select((inside.t >= start_us) & (inside.t < stop_us)))
+    assert all(0 < len(block) <= 3 for block in part)
 
 
 @pytest.mark.parametrize("name", WRITABLE)

@@ -30,7 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.columns import labels, pixels, whole_us
-from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised, regrouped, within
+from vid2ev.formats.event_file import BLOCK, Format, Recording, promised, regrouped, within
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import (
     MAGIC,
@@ -42,6 +42,7 @@ from vid2ev.formats.hdf5_file import (
     is_whole,
     opened,
 )
+from vid2ev.formats.sequential import Sequential
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.untrusted import check_bytes
@@ -56,17 +57,14 @@ MS_US = 1000
 BESIDE = ("events/label", "frames/t", "frames/to_idx", "ms_to_idx", "t_offset")  # the events
 
 
-class Hdf5Events:
-    """The events of an HDF5 file in the layout of DSEC.
+class Hdf5Events(Sequential):
+    """The events of an HDF5 file in the layout of DSEC; in order of time, parts of them are looked up.
 
     Raises DataError for a file that is not there, not an event file in that layout, or damaged.
     """
 
-    has_frames = False
-
     def __init__(self, path: Path):
-        self.path = path
-        self.warnings: list[str] = []
+        super().__init__(path)
         with opened(path, _check) as file:
             self.says_start = "t_offset" in file
             self.start_us = whole_us(path, np.ravel(file["t_offset"][()]))[0].item() if self.says_start else 0
@@ -99,13 +97,19 @@ class Hdf5Events:
                 yield from regrouped(within(self._stretch(file, 0, len(t), BLOCK), start_us, stop_us), block)
 
     def _stretch(self, file: h5py.File, first: int, last: int, block: int) -> Iterator[Events]:
-        """The events number first ... last - 1."""
-        columns = file["events"]
+        """Those of the events number first ... last - 1 that are within the sensor."""
+        columns, outside = file["events"], 0
         for at in range(first, last, block):
             part = slice(at, min(at + block, last))
             t = whole_us(self.path, columns["t"][part], self.start_us)
             label = labels(self.path, columns["label"][part]) if self.labelled else None
-            yield Events(t, *pixels(self.path, *(columns[name][part] for name in "xyp")), label)
+            events = Events(t, *pixels(self.path, *(columns[name][part] for name in "xyp")), label)
+            events, left = self._inside(events)
+            outside += left
+            if len(events):
+                yield events
+        if last - first == len(columns["t"]):  # (of parts, as many as are asked for, each would say another number)
+            self._leave_out(outside, f"{self._outside} are")
 
     def _is_in_order(self, t: h5py.Dataset) -> bool:
         """Whether no time goes back, without which none can be looked up."""
@@ -128,10 +132,6 @@ class Hdf5Events:
             middle = (low + high) // 2
             low, high = (middle + 1, high) if t[middle] < t_us else (low, middle)
         return low + int(np.searchsorted(t[low:high].astype(np.int64), t_us))
-
-    def frames(self) -> Iterator[Picture]:
-        """None."""
-        return iter(())
 
 
 def write_events(path: Path, recording: Recording) -> None:

@@ -1,4 +1,4 @@
-"""Event files that are read from the front to the back: they have no index of times."""
+"""Event files that are read from the front to the back: but for `hdf5`, which looks parts up, they have no index."""
 
 from __future__ import annotations
 
