@@ -21,6 +21,7 @@ from vid2ev.formats import (
     survey,
 )
 from vid2ev.formats.event_file import Format, Recording
+from vid2ev.recording.destination import check_place
 from vid2ev.recording.disk import sync, writing
 from vid2ev.recording.held import Held
 from vid2ev.stream.events import Events
@@ -59,10 +60,7 @@ def reformat(
         raise UsageError(f"format '{kind.name}' is only read; expected one of {', '.join(writable())}")
     if target.is_dir():
         raise UsageError(f"{target} is a folder; give a file in it, such as {target / f'events{kind.suffix}'}")
-    if target.is_symlink():
-        raise UsageError(f"{target} is a link, which would be replaced; give what it leads to, or another place")
-    if target.exists() and not target.is_file():
-        raise UsageError(f"{target} is no file but a pipe or a device, which one would replace; give another place")
+    check_place(target)
     if target.exists() and not overwrite:
         raise UsageError(f"{target} exists; --overwrite replaces it")
     file = open_events(of_only_camera(source))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.destination import begun_at, check_destination, check_folder, partial_of
+from vid2ev.recording.destination import begun_at, check_destination, check_folder, check_place, partial_of
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.sources.images import FRAMES
 
@@ -45,6 +45,7 @@ def check_free(output: Path, kind: Kind, overwrite: bool, resume: bool) -> None:
     beside = manifest_of(output, kind)
     if kind == "mp4":
         check_destination(output)
+        check_place(output)
         if os.path.lexists(beside) and not _is_of_film(beside):
             raise UsageError(f"{beside} is to be the film's manifest, and is another file; choose another name with -o")
     else:

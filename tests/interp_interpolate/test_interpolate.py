@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from dataclasses import fields, replace
@@ -396,6 +397,15 @@ def test_what_frames_cannot_take_the_place_of_is_refused_before_any_is_made(tmp_
     with pytest.raises(UsageError, match="holds other files"):
         interpolate(source, output, overwrite=True, report=never)
     assert [path.name for path in (tmp_path / f"{name}.partial").iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there are no pipes that have names")
+def test_a_pipe_is_not_replaced_by_a_film(tmp_path: Path) -> None:
+    recording(tmp_path / "in", moving(3))
+    os.mkfifo(tmp_path / "pipe.mp4")
+    with pytest.raises(UsageError, match=r"pipe\.mp4 is no file but a pipe"):
+        interpolate(tmp_path / "in", tmp_path / "pipe.mp4", multiple=2, method="linear", overwrite=True)
+    assert (tmp_path / "pipe.mp4").is_fifo()
 
 
 def test_a_file_where_a_folder_is_to_be_is_told_before_any_frame_is_made(tmp_path: Path) -> None:

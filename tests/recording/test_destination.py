@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from vid2ev import DataError, UsageError
 from vid2ev.recording.destination import check_destination, check_new
+from vid2ev.views.destination import check_free as shown_free
 
 
 @pytest.mark.parametrize("place", ["file/new", "file/new/newer"])
@@ -30,6 +33,23 @@ def test_a_new_file_takes_the_place_of_a_file_if_asked_and_never_of_a_folder(tmp
     for overwrite in (True, False):
         with pytest.raises(UsageError, match="exists; give a file's name"):
             check_new(tmp_path, overwrite)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there are no pipes that have names")
+@pytest.mark.parametrize("check", [check_new, shown_free], ids=["files", "pictures"])
+def test_a_new_file_never_takes_the_place_of_a_link_or_a_pipe(
+    tmp_path: Path, check: Callable[[Path, bool], None]
+) -> None:
+    """Nor of a device, such as /dev/null, which is there for all."""
+    pipe, link, nowhere = (tmp_path / f"{name}.png" for name in ("pipe", "link", "nowhere"))
+    os.mkfifo(pipe)
+    (tmp_path / "file").touch()
+    link.symlink_to("file")
+    nowhere.symlink_to("missing")
+    for path, said in ((pipe, "is no file but a pipe"), (link, "is a link"), (nowhere, "is a link")):
+        for overwrite in (True, False):
+            with pytest.raises(UsageError, match=f"{path.name} {said}"):
+                check(path, overwrite)
 
 
 def test_a_folder_that_may_not_be_written_to_is_known_before_anything_is_made(

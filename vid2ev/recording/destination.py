@@ -22,8 +22,7 @@ def check_destination(path: Path) -> None:
         raise DataError(f"{str(path)[:80]!r}: File name too long; give one that a folder can have with -o")
     if path.name in ("", "..") or path.is_mount() or os.path.realpath(path) == os.getcwd():
         raise UsageError(f"{path} cannot be renamed into place; give a folder within it, such as {path / 'events'}")
-    if path.is_symlink():
-        raise UsageError(f"{path} is a link, which would be replaced; give what it leads to, or another place")
+    _check_link(path)
     _check_above(path)
 
 
@@ -34,14 +33,29 @@ def check_folder(folder: Path) -> None:
         raise UsageError(f"{folder} is a file; choose a folder with -o")
 
 
+def check_place(path: Path) -> None:
+    """Raise UsageError where something else than a file, and no folder, would be replaced by one: a link, a pipe or a
+    device."""
+    _check_link(path)
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise UsageError(f"{path} is no file but a pipe or a device, which one would replace; give another place")
+
+
 def check_new(path: Path, overwrite: bool) -> None:
-    """Raise UsageError where a file would have to be replaced, DataError where it cannot be written."""
+    """Raise UsageError where a file would have to be replaced, or something else, DataError where it cannot be
+    written."""
+    check_place(path)
     if path.is_dir() or (path.exists() and not overwrite):
         remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
         raise UsageError(f"{path} exists; {remedy}")
     above = _check_above(path)
     if not os.access(above, os.W_OK | os.X_OK):
         raise DataError(f"{path} cannot be written: {above} may not be written to; choose another place")
+
+
+def _check_link(path: Path) -> None:
+    if path.is_symlink():
+        raise UsageError(f"{path} is a link, which would be replaced; give what it leads to, or another place")
 
 
 def _check_above(path: Path) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.errors import UsageError
-from vid2ev.recording.destination import check_folder
+from vid2ev.recording.destination import check_folder, check_place
 from vid2ev.views.on_disk import SLICES
 
 
@@ -25,6 +25,7 @@ def check_free(output: Path, overwrite: bool = False) -> None:
         _check_replaceable(output)
         taken = output.exists() and any(output.iterdir()) if output.is_dir() else output.exists()
     else:
+        check_place(output)
         taken = output.exists()
     if taken and not overwrite:
         raise UsageError(f"{output} exists; --overwrite replaces it, -o chooses another name")
