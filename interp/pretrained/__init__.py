@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 
 from vid2ev.errors import UsageError, nearest
+from vid2ev.untrusted import check_file
 
 OF_RUN = "weights.safetensors"  # of a run of training
 HERE = Path(__file__).parent
@@ -22,12 +23,13 @@ HDR = ("hdr-small", "hdr-tiny")
 def path_of(weights: str | Path) -> Path:
     """A file of weights: itself, that of a run's folder, or by its name, with _ or -, one that comes with this version.
 
-    Raises UsageError where there is no such file.
+    Raises UsageError where there is no such file, DataError for a pipe or a device.
     """
     path = Path(str(weights))
     if os.path.isdir(path):  # (Path.is_dir and Path.exists raise OSError for a name that is too long)
         path = path / OF_RUN
     if os.path.exists(path):
+        check_file(path)
         return path
     here = {file.stem: file for file in sorted(HERE.glob("*.safetensors"))}
     asked = str(weights).replace("-", "_")

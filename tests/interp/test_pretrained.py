@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from interp.networks.event_fed import EventFed
 from interp.networks.frame_fed import FrameFed
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 
 COME = sorted(pretrained.HERE.glob("*.safetensors"))
 
@@ -100,3 +102,11 @@ def test_weights_are_a_file_or_a_run_or_come_by_their_name(tmp_path: Path) -> No
         pretrained.path_of(tmp_path / "other" / pretrained.OF_RUN)
     with pytest.raises(UsageError, match="no such file"):
         pretrained.path_of("longer than files can be called " * 999)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there are no pipes that have names")
+def test_weights_from_a_pipe_are_not_waited_for(tmp_path: Path) -> None:
+    """As in `--network <(curl ...)`: they are read more than once, and not from front to back."""
+    os.mkfifo(tmp_path / "pipe.safetensors")
+    with pytest.raises(DataError, match=r"pipe\.safetensors: a pipe, expected a file"):
+        pretrained.path_of(tmp_path / "pipe.safetensors")
