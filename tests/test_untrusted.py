@@ -337,6 +337,15 @@ def test_a_pipe_is_said_to_be_one_and_not_waited_for(name: str, tmp_path: Path) 
     os.close(pipe)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere this device is none, or has another name")
+@pytest.mark.parametrize("name", READERS)
+def test_a_device_is_said_to_be_one_and_not_read_for_ever(name: str, tmp_path: Path) -> None:
+    """Nobody comes to the end of this one, whose size is 0."""
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(DataError, match=f"{name}: a device, expected a file"):
+        READERS[name](tmp_path / name)
+
+
 OSERROR = ("pipe", "pipe.npz", "text", "rig.toml", "bag.db3", "bag.db3.zstd")  # (which others make a sentence of)
 
 

@@ -56,13 +56,15 @@ def limit_for(count: int) -> str:
 
 
 def check_file(path: Path) -> None:
-    """Raise DataError for a pipe: whoever opens it waits for somebody to write, and what is read of it is gone."""
+    """Raise DataError for a pipe: whoever opens it waits for somebody to write, and what is read of it is gone; and
+    for a device: its size says nothing of what it gives, which may have no end."""
     try:
-        pipe = stat.S_ISFIFO(os.stat(path).st_mode)
+        mode = os.stat(path).st_mode
     except (OSError, ValueError):  # (whoever opens it says what is wrong)
         return
-    if pipe:
-        raise DataError(f"{path}: a pipe, expected a file; write to a file what comes out of it, and give that")
+    if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
+        what = "pipe" if stat.S_ISFIFO(mode) else "device"
+        raise DataError(f"{path}: a {what}, expected a file; write to a file what comes out of it, and give that")
 
 
 def read_text(path: Path) -> str:
