@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def sources_in(source: str, goes_to: Path) -> list[str]:
         recordings, unusable = sequences_in(folder)
     except UsageError:
         found = many.sources_in(source)
-        own = folder.resolve() == goes_to.resolve()
+        own = os.path.realpath(folder) == os.path.realpath(goes_to)  # (of links in a ring, Path's raises)
         return [each for each in found if not (own and _is_made(Path(each)))] or found
     return [*map(str, recordings), *unusable]
 

@@ -37,6 +37,8 @@ def test_folders_and_lists_stand_for_what_is_in_them() -> None:
         ("recordings/r0", ["recordings/r0"]), ("films/f1", ["films/f1"]),
     ):  # fmt: skip
         assert sources_in(argument, Path()) == found
+    Path("ring").symlink_to("ring")  # (into which nothing can be put, which is told when it is tried)
+    assert sources_in("films", Path("ring")) == films
 
 
 @pytest.mark.parametrize("kind", ["png", "mp4"])

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from vid2ev import DataError, UsageError
-from vid2ev.recording.destination import check_destination, check_new
+from vid2ev.recording.destination import check_apart, check_destination, check_new
+from vid2ev.recording.manifest import identity
 from vid2ev.views.destination import check_free as shown_free
 
 
@@ -65,3 +66,16 @@ def test_a_folder_that_may_not_be_written_to_is_known_before_anything_is_made(
             check_new(place, overwrite=True)
     closed.chmod(0o755)
     check_new(file, overwrite=True)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege there")
+def test_a_link_to_itself_is_a_link(tmp_path: Path) -> None:
+    ring = tmp_path / "ring"
+    ring.symlink_to("ring")
+    (tmp_path / "source").mkdir()
+    check_apart(tmp_path / "source", ring)
+    check_apart(ring, tmp_path / "out")
+    assert identity(tmp_path / "source", besides=[ring]) == identity(tmp_path / "source")
+    for check in (check_destination, lambda path: check_new(path, overwrite=True)):
+        with pytest.raises(UsageError, match="ring is a link"):
+            check(ring)

@@ -67,7 +67,7 @@ def _check_above(path: Path) -> Path:
 
 def check_apart(source: str | Path, output: Path) -> None:
     """Raise UsageError where what is made would take the place of a file or folder that it is made of."""
-    made, of = output.resolve(), Path(source).resolve()
+    made, of = (Path(os.path.realpath(path)) for path in (output, source))  # (of links in a ring, Path's raises)
     if os.path.exists(source) and made in (of, *of.parents):
         raise UsageError(f"{output} holds what it is to be made of, {source}; choose another place with -o")
 

@@ -45,7 +45,7 @@ def identity(path: Path, *, copies: bool = False, deep: bool = False, besides: C
     besides  files and folders that are no part of it, wherever they are: what is made of it may be put there
     """
     within = path.rglob("*") if deep else path.iterdir() if path.is_dir() else ()
-    others = {other.resolve() for other in besides}
+    others = {Path(os.path.realpath(other)) for other in besides}  # (of links in a ring, Path's raises)
     files = sorted(child for child in within if child.is_file()) if path.is_dir() else [path]
     if others:
         files = [file for file in files if not others & {(whole := file.resolve()), *whole.parents}]
