@@ -6,15 +6,19 @@ import ast
 import importlib.util
 import os
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numba
 import pytest
+from numba.core import caching
 
 from vid2ev.compiling import cache
 from vid2ev.compiling.cache import COLOURS, KERNELS
+from vid2ev.errors import DataError
 
 PACKAGE = Path(cache.__file__).parents[1]
 KERNEL = """
@@ -67,6 +71,36 @@ def test_a_kernel_is_compiled_again_where_what_was_kept_of_it_is_damaged(
     kept.write_bytes(bytes(size) if left is None else kept.read_bytes()[: int(left * size)])
     assert loaded(tmp_path / "kernel.py") == (0, 1)
     assert loaded(tmp_path / "kernel.py") == (1, 0)
+
+
+def test_where_no_folder_can_be_written_what_is_compiled_is_kept_while_the_program_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As for a user without a home, in an image that is only read."""
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    (temporary := tmp_path / "temporary").mkdir()
+    ensure = caching._CacheLocator.ensure_cache_path
+
+    def only_temporary(locator: Any) -> None:
+        if not Path(locator.get_cache_path()).is_relative_to(temporary):
+            raise PermissionError(13, "Permission denied")
+        ensure(locator)
+
+    monkeypatch.setattr(caching._CacheLocator, "ensure_cache_path", only_temporary)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", numba.config.CACHE_DIR)
+    monkeypatch.setattr(cache.ForThisRun, "_folder", None)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/of/nobody")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    with pytest.raises(DataError, match=r"kept nowhere.*; set NUMBA_CACHE_DIR"):
+        kernel_of(tmp_path / "kernel.py")
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    assert loaded(tmp_path / "kernel.py") == (0, 1)
+    assert loaded(tmp_path / "kernel.py") == (1, 0)
+    (folder,) = temporary.iterdir()
+    assert os.environ["NUMBA_CACHE_DIR"] == str(folder)  # (where processes that this one begins find it)
+    assert cache.ForThisRun._folder is not None
+    cache.ForThisRun._folder.cleanup()
+    assert not any(temporary.iterdir())
 
 
 @pytest.mark.parametrize(

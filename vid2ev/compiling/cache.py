@@ -9,6 +9,10 @@ numba also numbers the files of a function's variants 1, 2, ...: two processes t
 same time both write number 1, and whoever reads the index then runs the wrong code.  A process's own mark in the
 names keeps them apart; the variant whose place in the index is lost that way is compiled again.  So is one whose files
 are damaged, as after a power failure, where numba would end with what pickle says of them.
+
+numba looks for a folder that can be written: that of NUMBA_CACHE_DIR, the file's own, one in the user's home.  Where
+none can, as for a user without a home in an image that is only read, it would refuse to begin; here it keeps what it
+compiles for as long as the program runs (`ForThisRun`).
 """
 
 from __future__ import annotations
@@ -16,13 +20,17 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import os
 import uuid
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from numba import njit
-from numba.core.caching import IndexDataCacheFile
+from numba import config, njit
+from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator
+
+from vid2ev.errors import DataError
 
 _HERE = Path(__file__).parent
 _PACKAGE = _HERE.parent
@@ -32,6 +40,25 @@ _MARK = uuid.uuid4().hex[:8]
 
 
 _save, _load_index, _load_data = IndexDataCacheFile.save, IndexDataCacheFile._load_index, IndexDataCacheFile._load_data
+
+
+class ForThisRun(UserProvidedCacheLocator):  # type: ignore[misc]
+    """The last folder that is looked for: one that ends with this process, and that those which it begins find by
+    NUMBA_CACHE_DIR.  Raises DataError where there can be none."""
+
+    _folder: TemporaryDirectory[str] | None = None
+
+    @classmethod
+    def from_function(cls, py_func: Callable, py_file: str) -> Any:
+        try:
+            ForThisRun._folder = TemporaryDirectory(prefix="vid2ev_", ignore_cleanup_errors=True)
+        except OSError as error:
+            raise DataError(
+                "compiled kernels can be kept nowhere, not even in a temporary folder; set NUMBA_CACHE_DIR to a folder"
+                " that can be written"
+            ) from error
+        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = ForThisRun._folder.name
+        return super().from_function(py_func, py_file)
 
 
 def cached(function: Callable) -> Any:
@@ -105,3 +132,4 @@ def drop_stale_kernels() -> None:
 
 
 _mark_ours()
+CacheImpl._locator_classes = [*CacheImpl._locator_classes, ForThisRun]
