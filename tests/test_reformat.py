@@ -6,10 +6,12 @@ import json
 import math
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -227,6 +229,26 @@ def test_links_and_pipes_are_not_replaced(recording: Path) -> None:
         with pytest.raises(UsageError, match=said):
             reformat(recording, name, "csv", overwrite=True)
         assert Path(name).lstat().st_ino == before
+
+
+def test_who_asks_twice_to_end_leaves_nothing(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second time while it is cleared up."""
+    remove = shutil.rmtree
+
+    def asked_again(*arguments: Any, **options: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        remove(*arguments, **options)
+
+    def interrupted(path: Path, recording: Recording) -> None:
+        path.write_bytes(b"half")
+        monkeypatch.setattr(shutil, "rmtree", asked_again)
+        raise KeyboardInterrupt
+
+    kind = format_named("csv")
+    monkeypatch.setattr("vid2ev.reformat.format_named", lambda name: replace(kind, write=interrupted))
+    with pytest.raises(KeyboardInterrupt):
+        reformat(recording, "out.csv", "csv")
+    assert [path.name for path in Path().iterdir()] == ["whole.h5"]
 
 
 def test_a_full_disk_leaves_what_was_there(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:

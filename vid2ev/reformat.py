@@ -23,7 +23,7 @@ from vid2ev.formats import (
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.recording.destination import check_place
 from vid2ev.recording.disk import sync, writing
-from vid2ev.recording.held import Held
+from vid2ev.recording.held import Held, undisturbed
 from vid2ev.stream.events import Events
 from vid2ev.views.window import beginning_us, window
 
@@ -149,11 +149,12 @@ def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) ->
                 path.unlink()
             sync(target.absolute().parent)
     finally:
-        if held:
-            shutil.rmtree(work, ignore_errors=True)
-        held.close()
-        with suppress(OSError):  # (another one is writing there)
-            beside.rmdir()
+        with undisturbed():  # (Ctrl-C twice leaves nothing, either)
+            if held:
+                shutil.rmtree(work, ignore_errors=True)
+            held.close()
+            with suppress(OSError):  # (another one is writing there)
+                beside.rmdir()
     return places
 
 

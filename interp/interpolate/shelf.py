@@ -97,9 +97,10 @@ class Shelf:
     ) -> None:
         if not self._held:
             return
-        if not self._goes_on or isinstance(error, TooFine):
-            shutil.rmtree(self.partial, ignore_errors=True)
-        self._held.close()
+        with undisturbed():  # (Ctrl-C twice leaves nothing, either)
+            if not self._goes_on or isinstance(error, TooFine):
+                shutil.rmtree(self.partial, ignore_errors=True)
+            self._held.close()
 
     @property
     def _goes_on(self) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
+import signal
 import sys
 from dataclasses import fields, replace
 from fractions import Fraction
@@ -406,6 +408,27 @@ def test_a_pipe_is_not_replaced_by_a_film(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"pipe\.mp4 is no file but a pipe"):
         interpolate(tmp_path / "in", tmp_path / "pipe.mp4", multiple=2, method="linear", overwrite=True)
     assert (tmp_path / "pipe.mp4").is_fifo()
+
+
+def test_who_asks_twice_to_end_leaves_nothing_where_nothing_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second time while it is cleared up."""
+    remove = shutil.rmtree
+
+    def asked_again(*arguments: Any, **options: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        remove(*arguments, **options)
+
+    def interrupted(*_: object) -> None:
+        monkeypatch.setattr(shutil, "rmtree", asked_again)
+        raise KeyboardInterrupt
+
+    source = images(tmp_path / "in", moving(2))
+    monkeypatch.setattr("interp.interpolate.whole.stretches", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        interpolate(source, tmp_path / "out", multiple=2, method="linear", format="png")
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
 def test_a_file_where_a_folder_is_to_be_is_told_before_any_frame_is_made(tmp_path: Path) -> None:

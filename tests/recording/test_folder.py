@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 from pathlib import Path
 from typing import Any
@@ -253,6 +254,24 @@ def test_who_is_asked_to_end_while_it_begins_leaves_nothing(tmp_path: Path, monk
     assert not list(tmp_path.iterdir())
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)  # (it is heard again)
+
+
+def test_who_asks_twice_to_end_leaves_nothing_of_what_was_to_be_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second time while it is cleared up."""
+    remove = shutil.rmtree
+
+    def asked_again(*arguments: Any, **options: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        remove(*arguments, **options)
+
+    monkeypatch.setattr(shutil, "rmtree", asked_again)
+    with pytest.raises(KeyboardInterrupt), whole(tmp_path / "scene") as made:
+        made.mkdir()
+        (made / "000000.png").touch()
+        raise KeyboardInterrupt
+    assert not any(tmp_path.iterdir())
 
 
 def test_of_a_lock_nothing_is_left_and_that_of_others_stays(tmp_path: Path) -> None:

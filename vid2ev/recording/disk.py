@@ -16,7 +16,7 @@ from typing import IO
 import numpy as np
 
 from vid2ev.errors import DataError, DiskError, UsageError
-from vid2ev.recording.held import Held
+from vid2ev.recording.held import Held, undisturbed
 
 
 @contextmanager
@@ -58,12 +58,13 @@ def whole(path: Path) -> Iterator[Path]:
         put_in_place(made, path, replaced)
         sync(path.absolute().parent)
     finally:
-        if held:
-            _remove(made)
-            _remove(replaced)
-            held.close()
-        with suppress(OSError):
-            aside.rmdir()
+        with undisturbed():  # (Ctrl-C twice leaves nothing, either)
+            if held:
+                _remove(made)
+                _remove(replaced)
+                held.close()
+            with suppress(OSError):
+                aside.rmdir()
 
 
 @contextmanager
