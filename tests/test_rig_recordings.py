@@ -628,6 +628,19 @@ def test_frames_of_a_recording_are_seen_through_the_lens_of_their_camera(tmp_pat
         assert found.source.fov_deg == pytest.approx(80 if known else 60)
 
 
+def test_frames_are_seen_through_the_lens_that_their_camera_states_whatever_the_video_was_guessed_to_see(
+    tmp_path: Path,
+) -> None:
+    bent = {"distortion_model": "radtan", "distortion": (-0.2, 0.05, 0.0, 0.0)}
+    stated: tuple[dict[str, Any], ...] = ({"fov_deg": 50.0}, {"focal_px": (20.0, 21.0)}, bent)
+    cameras = [Camera(name=f"c{k}", kind="cis", size=(32, 24), **lens) for k, lens in enumerate(stated)]
+    convert(CLIP, tmp_path / "out", rig=Rig(cameras=tuple(cameras)), pictures="png", **OPTIONS)
+    for camera in json.loads((tmp_path / "out/manifest.json").read_text())["rig"]["cameras"]:
+        found = Recipe.of(tmp_path / "out" / camera["name"] / "frames", frame_camera=True).rig
+        assert not found.source_assumed
+        assert found.source.model_dump(mode="json") == camera["intrinsics"]
+
+
 def test_a_camera_with_finer_pixels_sees_a_scene_more_often() -> None:
     scene = "scene:parallax,seed=4,scene.duration_s=0.3,size=48x36,scene.min_fps=1"
     alone = Recipe.of(scene).source.frames_expected

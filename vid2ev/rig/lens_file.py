@@ -39,12 +39,17 @@ def _beside(folder: Path) -> Any:
 
 
 def _of_recording(folder: Path) -> Any:
-    """What DIR/manifest.json says of the camera of DIR/CAMERA/frames, or raw.  Raises LookupError where it was guessed
-    how wide the video sees, around which the cameras were."""
+    """What DIR/manifest.json says of the camera of DIR/CAMERA/frames, or raw.  Raises LookupError where that is the
+    lens of the video around which the cameras were, and it was guessed how wide that one sees."""
     folder = folder.absolute()  # (one may be in it)
     if folder.name not in (KINDS["raw"], KINDS["png"]):
         raise LookupError
     taker = folder.parent
     rig = json_of(read_text(taker.parent / "manifest.json"))["rig"]
-    known = [] if rig["source"]["assumed"] else rig["cameras"]
-    return {camera["name"]: camera["intrinsics"] for camera in known}[taker.name]
+    lens = {camera["name"]: camera["intrinsics"] for camera in rig["cameras"]}[taker.name]
+    if rig["source"]["assumed"]:
+        guessed = Intrinsics.model_validate({key: rig["source"][key] for key in Intrinsics.model_fields})
+        own = Intrinsics.model_validate(lens)
+        if own == guessed.scaled_to(own.size):
+            raise LookupError
+    return lens
