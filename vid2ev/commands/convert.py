@@ -100,7 +100,7 @@ from vid2ev.commands.worker_options import worker_options
 )  # fmt: skip
 @click.option(
     "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False),
-    help="Colour filters before the pixels.  [default: none, they see luminance]",
+    help="Colour filters before the pixels of event cameras.  [default: none, they see luminance]",
 )  # fmt: skip
 @click.option(
     "--effects", default="all", show_default=True, metavar="all|auto|none|NAME[,NAME...]",

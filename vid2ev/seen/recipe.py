@@ -55,7 +55,7 @@ class Recipe:
     seed           of the sensors that have none of their own, 0 ... 2**64 - 1
     labels         give each event its cause
     cuts           "restart": event cameras start afresh after a cut, and "keep": they see a step of light
-    bayer          the pattern of colour filters before the pixels; None for none: they see luminance
+    bayer          the pattern of colour filters before the pixels of event cameras; None for none: they see luminance
     truth          what is to be known for certain beside it
     """
 
