@@ -46,8 +46,13 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
 
 def notes(summary: Mapping[str, Any]) -> list[str]:
     """All of it, a sentence each."""
+    return [*remarks(summary), *(f"not scored: {said}" for said in not_scored(summary))]
+
+
+def not_scored(summary: Mapping[str, Any]) -> list[str]:
+    """What was not scored, and how much of it."""
     parts = [(count, reason.partition("s")) for reason, count in left_out(summary).items()]
-    return [*remarks(summary), *(f"not scored: {counted(count, thing)}{why}" for count, (thing, _, why) in parts)]
+    return [f"{counted(count, thing)}{why}" for count, (thing, _, why) in parts]
 
 
 def several(names: Iterable[str]) -> str:

@@ -23,7 +23,7 @@ from interp.evaluate.prediction_folders import passed_over
 from interp.evaluate.predictions import predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.rebuilders import Rebuilder, methods_of
-from interp.evaluate.remarks import left_out
+from interp.evaluate.remarks import not_scored
 from interp.evaluate.report.of_evaluation import write_pages
 from interp.evaluate.row import Row
 from interp.evaluate.rows import ROWS, write_rows
@@ -139,8 +139,8 @@ def evaluate(
 
 def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
     """Why nothing of a sequence was scored."""
-    if reasons := left_out({"sequences": {name: about}}):
-        return f"{name}: " + ", ".join(f"{count} x {reason}" for reason, count in reasons.items())
+    if reasons := not_scored({"sequences": {name: about}}):
+        return f"{name}: {', '.join(reasons)}"
     remedy = "give a smaller --skip" if about["frames"] >= FEWEST else "give more of it"
     frames = f"{about['frames']} frame{'s' * (about['frames'] != 1)}"
     return f"{name}: {frames}, expected {protocol.multiple + 1} or more; {remedy}"
