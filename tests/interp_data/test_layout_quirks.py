@@ -243,6 +243,14 @@ def test_lines_that_are_no_times_are_counted(tmp_path: Path) -> None:
     assert sequence.remarks == ["3 of the 9 lines of timestamp.txt say no time"]
 
 
+def test_the_mark_that_windows_puts_before_a_text_is_no_part_of_the_first_time(tmp_path: Path) -> None:
+    lines = "".join(f"{STEP_US * (k + 1)}\r\n" for k in range(6))
+    written(tmp_path / "seq", times=f"\ufeff{lines}")
+    sequence = open_sequence(tmp_path / "seq")
+    assert sequence.times_us.tolist() == (STEP_US * np.arange(1, 7)).tolist()
+    assert not any("no time" in remark for remark in sequence.remarks)
+
+
 def test_a_picture_whose_line_is_no_time_is_left_out_and_others_keep_theirs(tmp_path: Path) -> None:
     lines = [f"{STEP_US * (k + 1)}\n" for k in range(6)]
     written(tmp_path / "seq", times="".join(lines))

@@ -148,7 +148,7 @@ class Ergb:
         path = next((folder / name for name in STAMPS if (folder / name).is_file()), None)
         if path is None:
             raise DataError(f"{folder}: no {STAMPS[0]}; expected the times of its pictures, one to a line")
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
         times = [_time_us(line) for line in lines if line.strip()]
         if strange := times.count(None):
             self.remarks.append(f"{strange} of the {len(times)} lines of {path.name} say no time")
