@@ -57,7 +57,7 @@ class ForThisRun(UserProvidedCacheLocator):  # type: ignore[misc]
                 "compiled kernels can be kept nowhere, not even in a temporary folder; set NUMBA_CACHE_DIR to a folder"
                 " that can be written"
             ) from error
-        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = ForThisRun._folder.name
+        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = ForThisRun._folder.name  # type: ignore[attr-defined]
         return super().from_function(py_func, py_file)
 
 
