@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from interp.cost.measure import Rebuilding, Row
-from vid2ev.compare.plots import save
+from vid2ev.compare.plots import lettered, save
 from vid2ev.cost.plot import label, stairs
 from vid2ev.cost.table import columns
 from vid2ev.terminal import counted
@@ -39,6 +39,7 @@ def table(found: Rebuilding) -> str:
     return "\n".join([said, "", *columns(lines), "", recommended])
 
 
+@lettered()
 def plot(found: Rebuilding, picture: Path) -> None:
     """Draw it into a PNG file, which is there as a whole or not at all; raises DataError."""
     from matplotlib.figure import Figure
@@ -72,7 +73,8 @@ def _frame(axes: Any, found: Rebuilding, rows: list[Row]) -> None:
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_xlabel(f"ms per frame of {width}x{height} ({found.device}, {counted(found.threads, 'thread')})")
     axes.set_ylabel("PSNR [dB]")
-    axes.set_title(f"{Path(found.source).name}, x{found.multiple}", loc="left")
+    title = f"{Path(found.source).name}, x{found.multiple}"
+    axes.set_title(title, loc="left").set_parse_math(False)  # (names may have $ in them)
     axes.grid(alpha=0.25, which="major")
 
 

@@ -16,6 +16,7 @@ from moving_texture import texture
 
 from vid2ev import Dvs, Frame, events_of, load_sensor
 from vid2ev.compare.comparison import compare
+from vid2ev.compare.plots import save
 from vid2ev.cost.errors import Errors
 from vid2ev.cost.front import Budget
 from vid2ev.cost.measure import Cost, measured
@@ -104,6 +105,21 @@ def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: P
     assert warned.describe()["warnings"] == ["truncated"] and "\nwarning: truncated\n" in table(warned)
     plot(cost, tmp_path / "cost.png")
     assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.filterwarnings("error")
+def test_names_of_clips_and_numbers_of_threads_are_drawn_as_they_are(
+    cost: Cost, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr("vid2ev.cost.plot.save", lambda figure, path: drawn.append(figure) or save(figure, path))
+    name = "$\\frac$ and $x^2$, 街.mkv"
+    for threads in (1, 2):
+        plot(replace(cost, clip=name, threads=threads), tmp_path / "cost.png")
+    for figure, threads in zip(drawn, ("(1 thread)", "(2 threads)"), strict=True):
+        assert figure.axes[0].get_title(loc="left") == f"{name}, 96x64"
+        assert figure.axes[0].get_xlabel().endswith(threads)
+    assert "2 threads;" in table(replace(cost, threads=2)) and "1 thread;" in table(replace(cost, threads=1))
 
 
 def test_a_setting_that_was_found_where_nothing_happens_says_so(cost: Cost) -> None:

@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from matplotlib.image import imread
 
 from interp.cost import measure
-from interp.cost.measure import Size, rebuilding
-from interp.cost.shown import table
+from interp.cost.measure import Rebuilding, Row, Size, rebuilding
+from interp.cost.shown import plot, table
 from interp.cost.ways import Anew, Tiled, Way, ways
 from interp.evaluate.run import evaluate
 from interp.evaluate.simulated import Simulated
@@ -84,6 +84,14 @@ def test_times_are_those_of_the_clock_per_frame(quick: None) -> None:
         for times in row.ms.values():
             assert times == pytest.approx([200.0, 200.0])  # (three frames in 0.6 s)
     assert [done for done, _, _ in asked] == list(range(asked[0][1]))
+
+
+@pytest.mark.filterwarnings("error")
+def test_names_of_sources_and_networks_are_drawn_as_they_are(tmp_path: Path) -> None:
+    name = "$\\frac$ and $x^2$ 街"
+    rows = [Row(Way(name, "networks", METHODS["linear"], f"--network {k}"), 30.0, 0.9, {(64, 48): [9.0]}) for k in "ab"]
+    plot(Rebuilding(name, name, 1, 1, 8, ((64, 48),), "cpu", 1, tuple(rows)), tmp_path / "cost.png")
+    assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
 
 
 class Watched(Together):

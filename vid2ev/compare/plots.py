@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,14 @@ def plot(comparison: Comparison, picture: Path) -> None:
     draw_timing(panels["timing"], comparison)
     _draw_time(panels["time"], comparison)
     save(figure, picture)
+
+
+@contextmanager
+def lettered() -> Iterator[None]:
+    """Letters of names that the font lacks are boxes, without a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")
+        yield
 
 
 def save(figure: Any, picture: Path) -> None:

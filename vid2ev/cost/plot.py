@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.compare.plots import save
+from vid2ev.compare.plots import lettered, save
 from vid2ev.cost.front import Row
 from vid2ev.cost.measure import Cost
+from vid2ev.terminal import counted
 
 COLOURS = {
     "light": "#1f77b4",
@@ -47,6 +48,7 @@ PLACES = [  # of a name beside its point [points of type], and which end of it i
 ]
 
 
+@lettered()
 def plot(cost: Cost, picture: Path) -> None:
     """Draw it into a PNG file, which is there as a whole or not at all; raises DataError."""
     from matplotlib.figure import Figure
@@ -82,8 +84,9 @@ def _scale(axes: Any, cost: Cost, rows: list[Row]) -> None:
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     events = any(row.errors.distance is not None for row in rows)
     axes.set_ylabel("distance from the reference, vR" if events else "error of frames [LSB]")
-    axes.set_xlabel(f"time, in multiples of how long the clip is ({cost.threads} threads)")
-    axes.set_title(f"{Path(cost.clip).name}, {'x'.join(map(str, cost.size))}", loc="left")
+    axes.set_xlabel(f"time, in multiples of how long the clip is ({counted(cost.threads, 'thread')})")
+    title = f"{Path(cost.clip).name}, {'x'.join(map(str, cost.size))}"
+    axes.set_title(title, loc="left").set_parse_math(False)  # (names may have $ in them)
     axes.grid(alpha=0.25, which="major")
     axes.axvline(cost.reference.time, color="#999999", linestyle=":", linewidth=1)
     axes.annotate(
@@ -132,6 +135,7 @@ def label(axes: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
 
     for x, y, name, colour in points:
         text = axes.annotate(name, (x, y), (0, 0), textcoords="offset points", fontsize=8, color=colour, va="center")
+        text.set_parse_math(False)
 
         def there(place: tuple[int, int, str], text: Any = text) -> Any:
             text.set(position=place[:2], ha=place[2])

@@ -8,6 +8,7 @@ from vid2ev.cost.front import Row, refusal
 from vid2ev.cost.measure import Cost
 from vid2ev.cost.quality import Quality
 from vid2ev.cost.stretch import Stretch
+from vid2ev.terminal import counted
 
 SILENT = "nothing happens in the part of the clip that was tried, vid2ev cost --start S tries another"
 
@@ -54,7 +55,7 @@ def cells(cost: Cost) -> list[list[str]]:
 def _headed(cost: Cost) -> list[str]:
     width, height = cost.size
     part = stretch_in_words(cost.stretch_s)
-    threads = f"{cost.threads} thread{'s' * (cost.threads > 1)}"
+    threads = counted(cost.threads, "thread")
     return [
         f"{cost.clip}, {part}, {width}x{height}, {threads}; errors against the reference",
         "",

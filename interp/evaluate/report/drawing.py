@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import io
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from interp.evaluate.naming import shortened
+from vid2ev.compare.plots import lettered
 
 WIDTH_IN = 7.6
 INK, SOFT, FAINT, ACCENT = "#010203", "#040506", "#070809", "#0a0b0c"  # stand-ins
@@ -56,8 +56,7 @@ def look() -> Iterator[None]:
     """All drawing happens within: the house's look."""
     import matplotlib
 
-    with matplotlib.rc_context(LOOK), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph")  # of letters that its font lacks: those of the page are seen
+    with matplotlib.rc_context(LOOK), lettered():  # (in the page's own letters, which may have those)
         yield
 
 
