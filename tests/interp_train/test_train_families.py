@@ -24,9 +24,11 @@ from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.true_flows import with_flow_between, with_flows
 
-KINDS = {
+KINDS = {  # (of each loss one)
     "superslomo": FrameFedLearner,
     "rrin_events": FrameFedLearner,
+    "rrin_light": FrameFedLearner,
+    "rrin_events_light": FrameFedLearner,
     "timelens": FrameFedLearner,
     "flow": FlowLearner,
     "e2vid": EventFedLearner,
