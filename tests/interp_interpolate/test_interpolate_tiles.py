@@ -152,7 +152,7 @@ def test_events_that_belong_elsewhere_go_with_their_tile_too(event_size: tuple[i
         torch.testing.assert_close(cut.events.off_on, laid.off_on[(..., *tile.within)], atol=1e-4, rtol=0)
 
 
-@pytest.mark.parametrize("name", ["linear", "flow", "bridge", "guided", "rrin_events_light"])
+@pytest.mark.parametrize("name", [*METHODS, "rrin_events_light"])
 def test_images_come_some_at_a_time(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setattr(closed_forms, "AT_ONCE_PX", SIZE[0] * SIZE[1])
     monkeypatch.setattr(of_networks, "HELD", 2 * 3 * SIZE[0] * SIZE[1])
