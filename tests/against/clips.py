@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,10 @@ EVERYTHING = DvsSpec(
     refractory_us=150,
 )
 AFTER_TRACKING = EVERYTHING.model_copy(update={"filter": "after", "refractory": "track"})
+OF_FRAMES: dict[str, Any] = {  # a frame camera with every effect
+    "exposure_us": 23_000, "line_us": 900, "shot_noise": True, "read_noise_e": 3, "prnu": 0.02, "dsnu": 4,
+    "full_well_e": 9_000, "shading": (-0.1, -0.3),
+}  # fmt: skip
 
 
 def clean(**keys) -> DvsSpec:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from against.clips import OF_FRAMES
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,10 +27,6 @@ from .card_memories import Tensors, memories
 pytestmark = pytest.mark.long
 
 SIZE = (9, 5)
-EVERYTHING: dict[str, Any] = {
-    "exposure_us": 23_000, "line_us": 900, "shot_noise": True, "read_noise_e": 3, "prnu": 0.02, "dsnu": 4,
-    "full_well_e": 9_000, "shading": (-0.1, -0.3),
-}  # fmt: skip
 SEED = 2**64 - 1
 
 
@@ -70,10 +67,10 @@ def both(spec: CisSpec, memory: Any, linear: bool = False) -> tuple[Cis, CisOnCa
 @settings(max_examples=8)
 @given(st.data())
 def test_exposures_counts_and_state_are_those_of_the_sensor_on_a_cpu(data: st.DataObject) -> None:
-    on = data.draw(st.sets(st.sampled_from(sorted(EVERYTHING))))
+    on = data.draw(st.sets(st.sampled_from(sorted(OF_FRAMES))))
     more = {"colour": data.draw(st.booleans()), "blur": data.draw(st.booleans()), "noise_lsb": 5.2 * ("dsnu" in on)}
     spec = CisSpec(
-        frame_rate_hz=data.draw(st.sampled_from([70.0, 200.0])), **more, **{key: EVERYTHING[key] for key in on}
+        frame_rate_hz=data.draw(st.sampled_from([70.0, 200.0])), **more, **{key: OF_FRAMES[key] for key in on}
     )
     memory = data.draw(st.sampled_from([Simulated(), Tensors()]))
     cpu, card = both(spec, memory, linear=data.draw(st.booleans()))
@@ -86,7 +83,7 @@ def test_exposures_counts_and_state_are_those_of_the_sensor_on_a_cpu(data: st.Da
 
 
 def test_a_state_is_taken_up_by_the_other() -> None:
-    spec, frames = CisSpec(frame_rate_hz=150.0, **EVERYTHING), clip(12, 1, True)
+    spec, frames = CisSpec(frame_rate_hz=150.0, **OF_FRAMES), clip(12, 1, True)
     whole = list(Cis(spec, SIZE, SEED, camera=9).run(frames))
     (cpu, card), (here, there) = both(spec, Tensors()), both(spec, Tensors())
     for frame in frames[:6]:

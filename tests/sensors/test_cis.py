@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from against.clips import OF_FRAMES
 
 import vid2ev
 from vid2ev.errors import UsageError
@@ -20,10 +21,7 @@ from vid2ev.stream.frames import LUMINANCE, Frame
 
 NAMES = cis_names()
 SIZE = (20, 14)
-EVERYTHING = CisSpec(
-    frame_rate_hz=70.0, exposure_us=23_000, line_us=900, shot_noise=True, read_noise_e=3, prnu=0.02, dsnu=4,
-    full_well_e=9_000, shading=(-0.1, -0.3),
-)  # fmt: skip
+EVERYTHING = CisSpec(frame_rate_hz=70.0, **OF_FRAMES)
 
 
 def clip(n: int = 60, seed: int = 0, colour: bool = True) -> list[Frame]:
