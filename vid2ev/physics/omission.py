@@ -33,7 +33,7 @@ def tracks(spec: Any) -> bool:
 def echoes(spec: Any) -> bool:
     """Whether two recordings of a pixel that disagree about one event go on with other levels: thresholds are not all
     the same, or memories jump to the signal."""
-    return bool(tracks(spec) or spec.mismatch > 0 or spec.crossing_noise > 0 or spec.threshold_on != spec.threshold_off)
+    return bool(tracks(spec) or spread_of(spec) > 0 or spec.threshold_on != spec.threshold_off)
 
 
 def kind_of(spec: Any) -> Kind:
@@ -52,7 +52,7 @@ def obstacle(spec: Any) -> str:
         return "noise that trembles sends events wherever levels are, and others if these move"
     if spread_of(spec) > SPREAD_MOST * min(spec.threshold_on, spec.threshold_off):
         return "thresholds are spread so far that levels crowd where light trembles"
-    if not spec.random_phase and not (spec.mismatch > 0 or spec.crossing_noise > 0):
+    if not spec.random_phase and spread_of(spec) == 0:
         return "all pixels start in step, so nothing is known of how far their levels are"
     return ""
 
