@@ -27,7 +27,7 @@ import torch
 
 from interp.candidates.bridge import DARK
 from interp.candidates.guided import SMALLEST, averaged, dense_flow
-from interp.light import Transfer, luminance, to_light
+from interp.light import luminance, to_light
 from interp.precision import in_full_precision
 from interp.representation.carried import at_places, over, places_over
 from interp.representation.event_counts import EventCounts
@@ -40,9 +40,7 @@ LEAST_NATS = 0.3  # that these stand for
 
 
 @in_full_precision
-def registered(
-    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer = "srgb"
-) -> EventCounts:
+def registered(frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts) -> EventCounts:
     """Counts [B, 2, S, h, w] between frames [B, C, H, W], and where pixels of these look at them.
 
     They are looked for around the places that the counts know (`at_places`), or else edge on edge.
@@ -51,21 +49,17 @@ def registered(
     if min(height, width) < SMALLEST:
         return events
     whole = over(events.summed(), (height, width))
-    moved = [
-        _moved(*pictures) for pictures in zip(_change(frame_0, frame_1, whole, transfer), _net(whole), strict=True)
-    ]
+    moved = [_moved(*pictures) for pictures in zip(_change(frame_0, frame_1, whole), _net(whole), strict=True)]
     around = events.places.where if events.places else [places_over(events, (height, width))] * len(moved)
     where = [_beyond(places, flow.to(places)) for places, flow in zip(around, moved, strict=True)]
     return at_places(events, torch.stack(where))
 
 
 @in_full_precision
-def unexplained(
-    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer = "srgb"
-) -> float:
+def unexplained(frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts) -> float:
     """Share of the change between two frames [1, C, H, W] that events, at the places that they know, do not explain."""
     whole = over(events.summed(), (frame_0.shape[-2], frame_0.shape[-1]))
-    return _unexplained(_change(frame_0, frame_1, whole, transfer)[0].cpu().numpy(), _net(whole)[0].cpu().numpy())
+    return _unexplained(_change(frame_0, frame_1, whole)[0].cpu().numpy(), _net(whole)[0].cpu().numpy())
 
 
 def _beyond(places: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
@@ -75,9 +69,9 @@ def _beyond(places: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
     return places + across * flow[..., :1] + down * flow[..., 1:]
 
 
-def _change(frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer) -> torch.Tensor:
+def _change(frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts) -> torch.Tensor:
     """d of frames, [B, H, W] nat."""
-    lights = (luminance(to_light(frame, transfer)).clamp(min=0) for frame in (frame_0, frame_1))
+    lights = (luminance(to_light(frame, "srgb")).clamp(min=0) for frame in (frame_0, frame_1))
     first, last = (torch.log(averaged(light, events.footprint) + DARK) for light in lights)
     return (last - first)[:, 0]
 
