@@ -19,7 +19,7 @@ MEAN = 0.2
 def thresholds(sigma: float, pixels: int, seed: int = 0) -> np.ndarray:
     """ON and OFF thresholds of so many pixels, float32 [n, 2]."""
     theta = np.empty((pixels, 2), np.float32)
-    fill_thresholds(theta, np.uint64(seed), 0, 0, MEAN, MEAN, sigma)
+    fill_thresholds(theta, np.uint64(seed), 0, MEAN, MEAN, sigma)
     return theta
 
 

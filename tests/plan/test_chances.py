@@ -117,7 +117,7 @@ def test_busy_pixels_do_not_take_memory_for_each_of_their_events() -> None:
 def test_thresholds_are_at_or_below_a_level_as_often_as_drawn_ones(noise: float, mismatch: float) -> None:
     """Each pixel's as often as it meets them; all of them from the end of the clip on."""
     theta, mean = np.empty((2000, 2), np.float32), 0.15
-    fill_thresholds(theta, np.uint64(1), 0, 0, mean, mean, max(mismatch, 1e-9))
+    fill_thresholds(theta, np.uint64(1), 0, mean, mean, max(mismatch, 1e-9))
     pixels, draws = theta[:, 0].astype(np.float64), np.random.default_rng(2).standard_normal(500)
     drawn = np.array([[clipped(pixel, noise, z) for z in draws] for pixel in pixels])
     spec = DvsSpec(threshold_on=mean, threshold_off=mean, mismatch=mismatch, crossing_noise=noise)

@@ -57,13 +57,13 @@ def reached_spread(mean: float, sigma: float) -> float:
 
 
 @compiled
-def fill_thresholds(theta, seed, camera, first, mean_on, mean_off, sigma):
-    """Thresholds of pixels first, first + 1, ... into theta float32 [n, 2] (ON, OFF)."""
+def fill_thresholds(theta, seed, camera, mean_on, mean_off, sigma):
+    """Thresholds of pixels 0, 1, ... into theta float32 [n, 2] (ON, OFF)."""
     drawn = np.empty((2, CHUNK), np.float32)  # (what loops of vector code write lies side by side)
     for start in range(0, len(theta), CHUNK):
         some, (on, off) = theta[start : start + CHUNK], (drawn[0], drawn[1])
         for i in range(len(some)):
-            words = philox(seed, MISMATCH + 256 * camera, first + start + i, 0)
+            words = philox(seed, MISMATCH + 256 * camera, start + i, 0)
             z_on, z_off = normal_pair(words[0], words[1])
             on[i], off[i] = clipped(mean_on, sigma, z_on), clipped(mean_off, sigma, z_off)
         for i in range(len(some)):

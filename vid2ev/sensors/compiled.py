@@ -113,7 +113,7 @@ def planes_of(
 def draw_thresholds(theta: np.ndarray, spec: DvsSpec, num: Numbers) -> None:
     """The thresholds of the pixels into theta [float32 [n, 2], nat], where they have some of their own."""
     if num.mismatch > 0:
-        fill_thresholds(theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
+        fill_thresholds(theta, num.seed, num.camera, spec.threshold_on, spec.threshold_off, spec.mismatch)
 
 
 def bad_of(spec: DvsSpec, num: Numbers, pixels: int) -> np.ndarray:
