@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import recordings
 
-from vid2ev.formats.event_file import BLOCK, Picture, Recording
+from vid2ev.formats.event_file import Picture, Recording
 from vid2ev.stream.events import Events
 
 SIZE = (320, 240)
@@ -37,21 +39,13 @@ def times_us() -> dict[str, np.ndarray]:
 
 
 def recording_of(events: Events, start_us: int = START_US, pictures: list[Picture] | None = None) -> Recording:
-    parts = [events.select(np.arange(at, min(at + BLOCK, len(events)))) for at in range(0, len(events), BLOCK)]
-    last_us = int(events.t[-1]) - start_us if len(events) else 0
     frames = None if pictures is None else lambda: iter(pictures)
-    return Recording(SIZE, start_us, last_us, len(events), lambda: iter(parts), frames=frames)
+    return replace(recordings.recording_of(events, SIZE, start_us), frames=frames)
 
 
 def pictures_at(t: np.ndarray, *shape: int) -> list[Picture]:
     random = np.random.default_rng(2)
     return [Picture(int(at), random.integers(0, 256, shape).astype(np.uint8)) for at in t]
-
-
-def assert_same(one: Events, other: Events) -> None:
-    for name in ("t", "x", "y", "p"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert getattr(one, name).dtype == getattr(other, name).dtype
 
 
 def assert_same_pictures(found: list[Picture], expected: list[Picture]) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from container_recordings import assert_same, events_at, times_us
+from container_recordings import events_at, times_us
+from recordings import assert_same
 
 from vid2ev.errors import DataError
 from vid2ev.formats import describe_events, format_named, open_events, read_events

@@ -14,13 +14,13 @@ from container_recordings import (
     EVENT_FILES,
     SIZE,
     START_US,
-    assert_same,
     assert_same_pictures,
     events_at,
     pictures_at,
     recording_of,
     times_us,
 )
+from recordings import assert_same
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import check_holds, describe_events, open_events, read_events

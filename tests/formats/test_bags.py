@@ -20,13 +20,13 @@ from container_recordings import (
     HOUR_US,
     SIZE,
     START_US,
-    assert_same,
     assert_same_pictures,
     events_at,
     pictures_at,
     recording_of,
     times_us,
 )
+from recordings import assert_same
 from rosbags import rosbag1, rosbag2
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
