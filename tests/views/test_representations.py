@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +12,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from voxel_grid import voxel_grid
 
+from vid2ev.commands.convert import convert
 from vid2ev.errors import UsageError
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
 from vid2ev.stream.events import Events
 from vid2ev.views.counts import Counts
 from vid2ev.views.frame import Frame
 from vid2ev.views.representation import Kind, represent, slices_of
-from vid2ev.views.requests import parse_representation
+from vid2ev.views.requests import REPRESENTATIONS, SLICINGS, parse_representation, parse_slicing
 from vid2ev.views.slices import Area, Count, Duration, Slicing
 from vid2ev.views.time_surface import NEVER, ActiveEvents, TimeSurface, decayed
 from vid2ev.views.voxel import Voxel
@@ -253,6 +256,25 @@ def test_polarities_have_their_colours(text: str) -> None:
     picture = view.picture(view.take(0))
     for column, colour in ((2, ON), (9, OFF), (5, GROUND)):
         np.testing.assert_allclose(picture[3, column], in_8_bits(colour), atol=1)
+
+
+@pytest.mark.parametrize(
+    ("said", "parse", "option"),
+    [(REPRESENTATIONS, parse_representation, "frames_as"), (SLICINGS, parse_slicing, "frames_by")],
+)
+def test_what_a_refusal_names_is_understood_and_stands_in_the_help(said: str, parse: Any, option: str) -> None:
+    named = re.split(", | or ", said)
+    shown = next(each.help for each in convert.params if each.name == option)
+    for text in named:
+        parse(text)
+        assert text.partition(":")[0] in shown
+
+
+def test_all_that_a_refusal_names_are_tried() -> None:
+    named, tried = (
+        {text.partition(":")[0] for text in texts} for texts in (re.split(", | or ", REPRESENTATIONS), TEXTS)
+    )
+    assert named == tried
 
 
 @pytest.mark.parametrize(
