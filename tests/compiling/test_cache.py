@@ -103,6 +103,17 @@ def test_where_no_folder_can_be_written_what_is_compiled_is_kept_while_the_progr
     assert not any(temporary.iterdir())
 
 
+def test_of_a_home_that_nobody_knows_no_folder_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    for home, found in ("~/.cache/numba", False), (str(tmp_path / "home" / "numba"), True):
+        monkeypatch.setattr(caching.AppDirs, "user_cache_dir", home)
+        monkeypatch.chdir(tmp_path)
+        assert (cache.InHome.from_function(loaded, str(tmp_path / "kernel.py")) is not None) == found
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["home", "kernel.py"]
+    assert cache.InHome in caching.CacheImpl._locator_classes
+    assert caching.UserWideCacheLocator not in caching.CacheImpl._locator_classes
+
+
 @pytest.mark.parametrize(
     "decorator",
     ["compiling.compiler import compiled", "compiling.cache import cached", "scenes.rays.compiler import walk"],

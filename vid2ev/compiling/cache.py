@@ -28,7 +28,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from numba import config, njit
-from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator, UserWideCacheLocator
 
 from vid2ev.errors import DataError
 
@@ -40,6 +40,15 @@ _MARK = uuid.uuid4().hex[:8]
 
 
 _save, _load_index, _load_data = IndexDataCacheFile.save, IndexDataCacheFile._load_index, IndexDataCacheFile._load_data
+
+
+class InHome(UserWideCacheLocator):  # type: ignore[misc]
+    """numba's folder in the user's home; none where nobody knows where that is, and numba would make one called ~."""
+
+    def ensure_cache_path(self) -> None:
+        if not os.path.isabs(self.get_cache_path()):
+            raise FileNotFoundError("no home")
+        super().ensure_cache_path()
 
 
 class ForThisRun(UserProvidedCacheLocator):  # type: ignore[misc]
@@ -132,4 +141,6 @@ def drop_stale_kernels() -> None:
 
 
 _mark_ours()
-CacheImpl._locator_classes = [*CacheImpl._locator_classes, ForThisRun]
+CacheImpl._locator_classes = [
+    *(InHome if each is UserWideCacheLocator else each for each in CacheImpl._locator_classes), ForThisRun
+]  # fmt: skip
