@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import json
+import logging
 import os
 import shutil
 import signal
@@ -604,6 +605,12 @@ def test_who_asks_twice_to_end_hears_what_is_left(piece: int, monkeypatch: pytes
     assert (result.exit_code, result.stderr.count("\n")) == (130, 1)
     assert ("--resume" in result.stderr, "nothing is left" in result.stderr) == (kept, not kept)
     assert left() == ({"out.partial"} if kept else set())
+
+
+def test_where_there_is_no_home_what_draws_plots_does_not_complain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(logging.getLogger("matplotlib"), "level", logging.WARNING)
+    assert vid2ev("sensors").exit_code == 0
+    assert not logging.getLogger("matplotlib.font_manager").isEnabledFor(logging.WARNING)
 
 
 def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

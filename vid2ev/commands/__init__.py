@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import logging
 import os
 import sys
 from importlib.metadata import entry_points
@@ -55,6 +56,7 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Errors meant for people become one line; what else goes wrong keeps its traceback."""
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # (it warns where there is no home to keep its letters)
         try:
             with never_lost():
                 return super().invoke(ctx)
