@@ -48,7 +48,8 @@ SAYS = {  # what an option says of a job: the part of it, if it is in one, and t
 )  # fmt: skip
 @click.option(
     "--validate", multiple=True, metavar="VIDEO", type=click.Path(exists=True),
-    help="A video to validate with, or a folder as of --data, beside scenes: frames of it are left out.",
+    help="A video to validate with, or a folder of videos or of pictures with their times, beside scenes: frames of it"
+    " are left out.",
 )  # fmt: skip
 @click.option("-o", "--output", metavar="RUN", help="Folder of the run.  [default: NETWORK_SIZE here]")
 @click.option("--time", "time_", metavar="TIME", help="How long it may take, such as 2h.  [default: 55m]")

@@ -19,8 +19,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from interp.data.chance import chance, uniform
 from interp.data.sensor_ranges import SENSORS, SensorRanges
-from interp.data.video_shots import length_of
-from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_sensor, open_source
+from interp.data.video_shots import film_at, length_of
+from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_sensor
 from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
@@ -134,7 +134,7 @@ def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
     """Of one video."""
     if is_single_picture(Path(video)):
         raise UsageError(f"{video}: a single picture; give a video, or a folder that holds a sequence of pictures")
-    source = open_source(video)
+    source = film_at(video)
     count, seconds = length_of(source, video)
     frame_s = seconds / max(count, 1)
     rig, exposure_s = _rig(spec, place)

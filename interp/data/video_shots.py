@@ -18,10 +18,11 @@ import numpy as np
 from interp.data.chance import chance
 from interp.data.settings import ClipSettings
 from interp.data.shot import AHEAD, Beside, coarse
-from vid2ev import Frame, UsageError, open_source
+from vid2ev import DataError, Frame, UsageError, open_source
 from vid2ev.sensors.devices import Device
 from vid2ev.sources import Source, begins_s, is_single_picture
 from vid2ev.stamps import Stamp, stamp
+from vid2ev.stream.frames import Colour
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
 
@@ -119,9 +120,17 @@ def _opened(name: str) -> tuple[Source, float]:
     return _opened_once(name, stamp(name))
 
 
+def film_at(name: str, colour: Colour = "luminance") -> Source:
+    """A film, whose times are its own: there is no --fps here that its complaints could ask for."""
+    try:
+        return open_source(name, colour=colour)
+    except (UsageError, DataError) as error:
+        raise type(error)(str(error).replace("give --fps, or put", "put")) from error
+
+
 @lru_cache(maxsize=16)
 def _opened_once(name: str, written: Stamp) -> tuple[Source, float]:
-    source = open_source(name, colour="rgb")
+    source = film_at(name, "rgb")
     return source, begins_s(source)
 
 

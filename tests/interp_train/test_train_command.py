@@ -21,7 +21,7 @@ from interp.train import runs
 from interp.train.batches import Feed
 from interp.train.job import Job
 from interp.train.machines import Machines
-from vid2ev.commands import Commands
+from vid2ev.commands import Commands, main
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.exposures import write_codes
 from vid2ev.sensors.devices import Device
@@ -372,6 +372,18 @@ def test_a_film_that_is_too_small_is_refused_before_training(tmp_path: Path) -> 
     np.savez(tmp_path / "film.npz", frames=np.zeros((20, 24, 40, 3), np.float32), fps=30)
     shown = run("--data", "film.npz", "--dry-run")
     assert shown.exit_code == 2 and "film.npz: 40x24 pixels; expected at least 128x128" in shown.output
+
+
+@pytest.mark.parametrize("command", [["train", "--dry-run", "--data"], ["dataset", "set", "--from"]])
+@pytest.mark.parametrize("stack", [False, True])
+def test_pictures_without_times_are_told_of_what_there_is_here(tmp_path: Path, command: list[str], stack: bool) -> None:
+    """Not of --fps, which `convert` and `eval` have."""
+    (tmp_path / "clip").mkdir()
+    for k in range(3):
+        write_codes(tmp_path / "clip" / f"{k}.png", np.zeros((24, 40, 3), np.uint8))
+    np.savez(tmp_path / "clip.npz", frames=np.zeros((3, 24, 40), np.uint8))
+    shown = CliRunner().invoke(main, [*command, str(tmp_path / f"clip{'.npz' * stack}")])
+    assert shown.exit_code == 2 and "without times; put " in shown.output and "--fps" not in shown.output
 
 
 @pytest.mark.parametrize("option", ["--data", "--validate"])

@@ -160,7 +160,7 @@ class Images:
         file = _times_in(self.path)
         if not file.exists():
             raise UsageError(
-                f"{self.path}: images without times; give --fps, or a {TIMESTAMPS} with one line per image"
+                f"{self.path}: images without times; give --fps, or put a {TIMESTAMPS} with one line per image there"
             )
         stamps, unit = read_timestamps(file, [place.name for place, _ in self._places])
         if len(stamps) != len(self._places):
