@@ -381,7 +381,7 @@ def test_pictures_without_times_are_told_of_what_there_is_here(tmp_path: Path, c
     (tmp_path / "clip").mkdir()
     for k in range(3):
         write_codes(tmp_path / "clip" / f"{k}.png", np.zeros((24, 40, 3), np.uint8))
-    np.savez(tmp_path / "clip.npz", frames=np.zeros((3, 24, 40), np.uint8))
+    np.savez(tmp_path / "clip.npz", frames=np.zeros((3, 24, 40), np.float32))
     shown = CliRunner().invoke(main, [*command, str(tmp_path / f"clip{'.npz' * stack}")])
     assert shown.exit_code == 2 and "without times; put " in shown.output and "--fps" not in shown.output
 
