@@ -420,6 +420,29 @@ def test_text_of_others(tmp_path: Path, name: str, text: str) -> None:
     assert bool(file.warnings) == (text == "microseconds")
 
 
+@pytest.mark.parametrize(
+    ("before", "line"),
+    [
+        ("", "{t},{x},{y},{p}\n"),
+        ("", "{x},{y},{p},{t}\r\n"),
+        ("\ufeff", " {t}, {x}, {y}, {p}"),
+        ("", "{t}e0,{x}.0,{y},{p},0\n"),
+        ("# timestamp [ns], x, y, polarity\n", "{t},{x},{y},{p}\n"),
+    ],
+)
+def test_numbers_between_commas_without_names_are_told_to_name_them(tmp_path: Path, before: str, line: str) -> None:
+    """Nobody knows which column is which; with such a line they are read."""
+    path = tmp_path / "events.csv"
+    path.write_text(before + line.format(t=10, x=1, y=2, p=1))
+    for read in (describe_events, open_events):
+        with pytest.raises(DataError, match="has no line that names its columns; put one before the others"):
+            read(path)
+    path.write_text(line.replace("{t}", "t").replace("{x}", "x").replace("{y}", "y").replace("{p}", "p").strip() + "\n")
+    if "e0" not in line:
+        path.write_text(path.read_text() + line.format(t=10, x=1, y=2, p=1))
+        assert rows(open_events(path)) == [(10, 1, 2, 1)]
+
+
 def test_text_that_is_wrong_is_refused_with_its_line(tmp_path: Path) -> None:
     for line in (
         b"1,2,3",

@@ -39,3 +39,11 @@ def pixels(path: Path, x: np.ndarray, y: np.ndarray, p: np.ndarray) -> tuple[np.
     if any(values.min() < 0 or values.max().item() > 0xFFFF for values in wide):  # (float16 has no such number)
         raise DataError(f"{path} has columns or rows that are not within 0 ... 65535; get another copy")
     return x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8)
+
+
+def saved_as_arrays(path: Path, reader: str) -> str:
+    """How events of a file that calls its columns otherwise become such that can be read."""
+    return (
+        f"read them with {reader}, and save events with numpy.savez('{path.stem}.npz', t=t, x=x, y=y, p=p), t in whole"
+        " microseconds"
+    )

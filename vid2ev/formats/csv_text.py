@@ -5,7 +5,8 @@
 
 Columns are read in any order and by other names in use (`NAMES`; polarity may be -1, too), and so are the files of
 Metavision, which name no columns, "x,y,p,t", but have "%geometry:WIDTH,HEIGHT" before them, and those of faery, which
-write the size into the names: "t,x@1280,y@720,on".
+write the size into the names: "t,x@1280,y@720,on".  Numbers whose columns nobody names are refused: t,x,y,p and x,y,p,t
+are both in use.
 """
 
 from __future__ import annotations
@@ -21,17 +22,22 @@ from vid2ev.formats.text import FIELDS, MARK, TextEvents, write_lines
 NAMES = {"t": "ts|time|timestamp|t_us|time_us|timestamp_us", "x": "", "y": "", "p": "on|pol|polarity", "label": ""}
 GEOMETRY = re.compile(rb"%geometry:(\d{1,5}),(\d{1,5})\r?\n")
 METAVISION = ["x", "y", "p", "t"]
+NUMBER = rb"[ \t]*[-+]?[\d.][\deE.+-]{0,40}[ \t]*"
+UNNAMED = re.compile(rb"(?:[#%%][^\n]{0,1000}\n)*(%b(?:,%b){3,4})(?:\r?\n|$)" % (NUMBER, NUMBER))  # of events, it seems
 
 
 class CsvEvents(TextEvents):
-    """The events of comma-separated text.  Raises DataError for a file whose columns are not named."""
+    """The events of comma-separated text.  Raises DataError for numbers whose columns are not named."""
 
     def __init__(self, path: Path):
         with reading(path) as file:
             head = file.read(HEAD)
         found = _columns(head)
         if found is None:
-            raise DataError(f"{path} has no first line that names the columns t, x, y, p; expected one")
+            raise DataError(
+                f"{path} has no line that names its columns; put one before the others, such as t,x,y,p or x,y,p,t, in"
+                " the order that they have, with t in whole microseconds"
+            )
         fields, skip, size = found
         super().__init__(path, fields, 0, skip)
         self.size = size
@@ -64,7 +70,7 @@ FORMAT = Format(
     "csv",
     "comma-separated text: t,x,y,p",
     ".csv",
-    recognises=lambda head, path: _columns(head) is not None,
+    recognises=lambda head, path: _columns(head) is not None or UNNAMED.match(head.removeprefix(MARK)) is not None,
     open=CsvEvents,
     write=write_events,
     largest=(1 << 16, 1 << 16),

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.columns import labels, pixels, whole_us
+from vid2ev.formats.columns import labels, pixels, saved_as_arrays, whole_us
 from vid2ev.formats.event_file import BLOCK, Format, Recording, promised, regrouped, within
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import (
@@ -201,7 +201,8 @@ def _check(file: h5py.File, path: Path) -> None:
     check_links(file, path, [*(f"events/{name}" for name in "txyp"), *BESIDE])
     columns = [file.get(f"events/{name}") for name in "txyp"]
     if not all(isinstance(column, h5py.Dataset) and column.ndim == 1 for column in columns):
-        raise DataError(f"{path} has no events/t, x, y, p; expected an event file in the layout of DSEC")
+        how = saved_as_arrays(path, "h5py.File")
+        raise DataError(f"{path} has no events/t, x, y, p, as the layout of DSEC; where it calls events otherwise, {how}")
     if any(column.dtype.kind not in "iufb" for column in columns):
         types = ", ".join(str(column.dtype) for column in columns)
         raise DataError(f"{path} has events/t, x, y, p of types {types}; expected numbers")

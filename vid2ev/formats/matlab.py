@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.errors import DataError
+from vid2ev.formats.columns import saved_as_arrays
 
 MAT, MAT_OF_HDF5 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"  # (5 is what versions 5 to 7.2 of MATLAB write)
 
@@ -20,11 +21,8 @@ def refuse_mat(path: Path) -> None:
     if not old and not _begins(path, MAT_OF_HDF5):
         return
     as_it_is = f"; `vid2ev interpolate` takes it as it is, with {path.stem}.png beside it" if old else ""
-    raise DataError(
-        f"{path} is a file of MATLAB's, which calls its tables as it likes; read them with"
-        f" {'scipy.io.loadmat' if old else 'h5py.File'}, and save events with numpy.savez('{path.stem}.npz', t=t, x=x,"
-        f" y=y, p=p), t in whole microseconds{as_it_is}"
-    )
+    how = saved_as_arrays(path, "scipy.io.loadmat" if old else "h5py.File")
+    raise DataError(f"{path} is a file of MATLAB's, which calls its tables as it likes; {how}{as_it_is}")
 
 
 def _begins(path: Path, magic: bytes) -> bool:
