@@ -502,6 +502,20 @@ def test_times_of_any_length_come_back_from_text(tmp_path: Path, name: str) -> N
     assert [row[0] for row in rows(open_events(path))] == t.tolist()
 
 
+@pytest.mark.parametrize("names", ["davis/left/{}", "prophesee/left/{}", "{}", "events/{}s"])  # MVSEC, M3ED, EDS, HQF
+def test_hdf5_of_other_names_says_how_its_events_become_some_that_are_read(tmp_path: Path, names: str) -> None:
+    path, events = tmp_path / "data.hdf5", events_of(np.arange(0, 3000, 7), (12, 9))
+    with h5py.File(path, "w") as file:
+        for name, column in columns(events).items():
+            file[names.format(name)] = column
+    for read in (describe_events, open_events):
+        with pytest.raises(DataError, match=r"h5py\.File, .*savez\('data\.npz', t=t, x=x, y=y, p=p\)"):
+            read(path)
+    with h5py.File(path) as file:
+        np.savez(tmp_path / "data.npz", **{name: np.array(file[names.format(name)]) for name in "txyp"})
+    assert_same(Events.concatenate(read_events(tmp_path / "data.npz")), events)
+
+
 @pytest.mark.parametrize("version", ["5.0", "7.3"])
 def test_a_file_of_matlab_says_how_its_events_become_some_that_are_read(tmp_path: Path, version: str) -> None:
     path, events = tmp_path / "recorded.mat", events_of(np.arange(0, 3000, 7), (12, 9))

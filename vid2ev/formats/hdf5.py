@@ -202,7 +202,7 @@ def _check(file: h5py.File, path: Path) -> None:
     columns = [file.get(f"events/{name}") for name in "txyp"]
     if not all(isinstance(column, h5py.Dataset) and column.ndim == 1 for column in columns):
         how = saved_as_arrays(path, "h5py.File")
-        raise DataError(f"{path} has no events/t, x, y, p, as the layout of DSEC; where it calls events otherwise, {how}")
+        raise DataError(f"{path} has no events/t, x, y, p as DSEC's files have; where it calls events otherwise, {how}")
     if any(column.dtype.kind not in "iufb" for column in columns):
         types = ", ".join(str(column.dtype) for column in columns)
         raise DataError(f"{path} has events/t, x, y, p of types {types}; expected numbers")
