@@ -359,6 +359,19 @@ def test_of_hardly_any_events_of_thresholds_that_differ_nothing_is_sure() -> Non
     assert plan.gone in ((), ("refractory",)) and "estimate" in {row.omission.kind for row in plan.rows}
 
 
+def test_of_light_that_crosses_more_levels_at_once_than_are_solved_nothing_is_sure() -> None:
+    """What bounds count is what is crossed; beyond `max_crossings` not all of it is sent."""
+    size, frames = (32, 24), ramps()
+    for cap in (1, 2, 4096):
+        spec = POLES.model_copy(update={"max_crossings": cap})
+        plan, full = plan_of(scene_of(spec, size, frames), spec, 1.0), sent(spec, size, frames)
+        assert plan.gone == (("photoreceptor", "follower") if cap == 4096 else ())
+        assert (f"max_crossings = {cap}" in str(plan)) == (cap != 4096)
+        for row in plan.rows:
+            changed = distance(full, sent(without(spec, row.effect, row.omission), size, frames), size)
+            assert row.omission.sure == (changed <= row.omission.distance) == (cap == 4096)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("share", [0.6, 3.0])
 def test_pixels_of_low_thresholds_send_more_densely(share: float) -> None:
@@ -432,6 +445,14 @@ def flashing(contrast_nat: float, dt_ns: int, frames: int, size: tuple[int, int]
     """Light of all pixels that is bright in every other frame."""
     lights = [np.full(size[::-1], 0.2 * math.exp(contrast_nat * (k % 2)), np.float32) for k in range(frames)]
     return [Frame(light, k * dt_ns) for k, light in enumerate(lights)]
+
+
+def ramps(frames: int = 40, size: tuple[int, int] = (32, 24)) -> list[Frame]:
+    """Light that goes up and down by 1.2 nat in 12 ms, and stays as long at its ends, each pixel a little later."""
+    width, height = size
+    phase = np.linspace(0, 1, width * height).reshape(height, width)
+    lights = [0.2 * np.exp(1.2 * np.clip(2 - np.abs((k / 3 + phase) % 8 - 4), -0.5, 0.5)) for k in range(frames)]
+    return [Frame(light.astype(np.float32), k * 4_000_000) for k, light in enumerate(lights)]
 
 
 def held(spec: DvsSpec, size: tuple[int, int], frames: list[Frame], *effects: str) -> None:

@@ -1,4 +1,4 @@
-"""How steep the comparator's input is, at most, by the slopes of the light that were measured."""
+"""How steep the comparator's input is, and how far it goes, at most, by the slopes and the light that were measured."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.bounds.scene import QUARTER_EDGES, Scene
+from vid2ev.physics.log_curve import curve_of, log_level
 
 
 def steepest(scene: Scene, spec: Any) -> np.ndarray:
@@ -19,6 +20,15 @@ def steepest(scene: Scene, spec: Any) -> np.ndarray:
         return scene.slope_max
     dark = min(spec.bandwidth_dark, spec.dark_level) if spec.log_curve == "offset" else spec.bandwidth_dark
     return scene.slope_max * (scene.light_max + spec.bandwidth_dark) / (scene.light_min + dark)
+
+
+def farthest(scene: Scene, spec: Any) -> np.ndarray:
+    """Bound on how far the comparator's input goes [tiles, nat]: what is filtered stays within its light."""
+    curve = curve_of(spec.log_curve, spec.dark_level)
+    darkest, brightest = (
+        np.array([log_level(float(light), curve) for light in lights]) for lights in (scene.light_min, scene.light_max)
+    )
+    return brightest - darkest
 
 
 def slopes_of(scene: Scene, spec: Any) -> np.ndarray:

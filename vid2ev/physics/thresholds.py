@@ -32,6 +32,12 @@ def widest(spec: Any) -> float:
     return float(_limited(means, spec.crossing_noise, np.array(np.inf)).sum())
 
 
+def least(spec: Any) -> float:
+    """The least threshold of any pixel and crossing [nat]."""
+    means, lowest = np.array([spec.threshold_on, spec.threshold_off]), np.array(-np.inf)
+    return float(_limited(_limited(means, spec.mismatch, lowest), spec.crossing_noise, lowest).min())
+
+
 def spread_thresholds(mean: float, spec: Any, count: int) -> np.ndarray:
     """So many thresholds of this mean that stand for those of all pixels and crossings, in no order [nat]."""
     draws, normal = random.Random(0), NormalDist()

@@ -7,7 +7,8 @@ distance is a metric, bounds b_1, b_2, ... are together
     (sqrt b_1 + sqrt b_2 + ...)^2 <= tolerance
 
 Estimates leave out nothing, and what costs nothing stays.  Of pixels whose memory jumps to the signal after each
-event (`refractory = "track"`) nearly all are estimates, so of these sensors hardly anything is left out.  Of pixels
+event (`refractory = "track"`) nearly all are estimates, so of these sensors hardly anything is left out; and all are
+where light may cross more levels at once than `max_crossings`, as bounds count all that are crossed.  Of pixels
 that start in step with thresholds that are all the same, a bound says only how far apart recordings with nothing in
 common are.
 Effects are tried in the order of their bounds; the second pole before both.
@@ -38,7 +39,8 @@ from vid2ev.physics import (
     shading,
     shot,
 )
-from vid2ev.physics.thresholds import spread_of
+from vid2ev.physics.slopes import farthest
+from vid2ev.physics.thresholds import least, spread_of
 from vid2ev.sensors.cis_spec import EFFECTS as OF_FRAMES
 from vid2ev.sensors.record import changed
 from vid2ev.sensors.spec import DvsSpec
@@ -183,7 +185,11 @@ def plan_of(
 
 def _said(omission: Omission, scene: Scene, spec: DvsSpec) -> Omission:
     """What an omission is said to change: where thresholds differ and light changes, but hardly any event is expected,
-    that is no bound, for the few are those of pixels whose thresholds happen to be low."""
+    that is no bound, for the few are those of pixels whose thresholds happen to be low; nor is it where light may cross
+    more levels at once than are solved one by one, for what bounds count is what is crossed."""
+    if omission.sure and not scene.still and float(farthest(scene, spec).max()) >= spec.max_crossings * least(spec):
+        why = f"{omission.why}; with max_crossings = {spec.max_crossings} some of it may not be sent"
+        return replace(omission, kind="estimate", why=why)
     few = scene.events < FEW and scene.slope_max.any() and spread_of(spec) > 0
     return replace(omission, kind="estimate") if few and omission.kind == "99.9 % bound" else omission
 
