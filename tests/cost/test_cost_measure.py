@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from moving_texture import texture
 
 from vid2ev import Dvs, Frame, events_of, load_sensor
@@ -21,7 +23,7 @@ from vid2ev.cost.errors import Errors
 from vid2ev.cost.front import Budget
 from vid2ev.cost.measure import Cost, measured
 from vid2ev.cost.passes import Float64Dvs, run
-from vid2ev.cost.plot import plot
+from vid2ev.cost.plot import label, plot
 from vid2ev.cost.rung import Rung
 from vid2ev.cost.stretch import beginning_of, stretch_of
 from vid2ev.cost.table import cells, recommendation, stretch_in_words, table
@@ -105,6 +107,20 @@ def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: P
     assert warned.describe()["warnings"] == ["truncated"] and "\nwarning: truncated\n" in table(warned)
     plot(cost, tmp_path / "cost.png")
     assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.02, 0.05, 0.1])
+def test_no_name_is_under_the_ring_around_the_recommended_point(apart: float) -> None:
+    axes = Figure(figsize=(9.5, 6)).add_subplot()
+    axes.set(xlim=(0, 10), ylim=(0, 10))
+    points = [(5.0 + k * apart, 5.0, f"setting number {k}", "black") for k in range(3)]
+    axes.scatter(*zip(*(point[:2] for point in points), strict=True), s=36)
+    axes.scatter([5.0], [5.0], s=190, facecolors="none")
+    label(axes, points)
+    middle, radius_px = axes.transData.transform((5.0, 5.0)), math.sqrt(190) / 2 * axes.figure.dpi / 72
+    for text in axes.texts:
+        box = text.get_window_extent()
+        assert math.dist(middle, np.clip(middle, box.min, box.max)) > radius_px, text.get_text()
 
 
 @pytest.mark.filterwarnings("error")

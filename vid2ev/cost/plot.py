@@ -36,7 +36,7 @@ MEANINGS = {
     "several": "several together",
 }
 LEAST = 1e-4  # less is drawn as nothing
-MARK_PX = 5  # half of what a point takes
+RIM_PT = 1  # around a point
 PLACES = [  # of a name beside its point [points of type], and which end of it is there; the best ones first
     *((8, up, "left") for up in (0, 7, -7)),
     *((-8, up, "right") for up in (0, 7, -7)),
@@ -120,12 +120,15 @@ def stairs(axes: Any, x: Sequence[float], y: Sequence[float]) -> None:
 
 
 def label(axes: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
-    """Names beside points (x, y, name, colour), each where it covers least of names and points, and of lines."""
+    """Names beside points (x, y, name, colour), each where it covers least of names, of what is scattered, and of
+    lines."""
     from matplotlib.transforms import Bbox
 
     axes.figure.draw_without_rendering()
-    marks = axes.transData.transform([point[:2] for point in points])
-    taken = [Bbox.from_bounds(x - MARK_PX, y - MARK_PX, 2 * MARK_PX, 2 * MARK_PX) for x, y in marks]
+    taken: list[Any] = []
+    for drawn in axes.collections:  # points, and the ring around the recommended one
+        half = (math.sqrt(drawn.get_sizes()[0]) / 2 + RIM_PT) * axes.figure.dpi / 72
+        taken += [Bbox([place - half, place + half]) for place in axes.transData.transform(drawn.get_offsets())]
     lines = [line.get_path().transformed(line.get_transform()) for line in axes.lines]
 
     def covers(box: Any) -> int:
