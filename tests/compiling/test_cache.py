@@ -18,7 +18,6 @@ from numba.core import caching
 
 from vid2ev.compiling import cache
 from vid2ev.compiling.cache import COLOURS, KERNELS
-from vid2ev.errors import DataError
 
 PACKAGE = Path(cache.__file__).parents[1]
 KERNEL = """
@@ -91,8 +90,8 @@ def test_where_no_folder_can_be_written_what_is_compiled_is_kept_while_the_progr
     monkeypatch.setattr(cache.ForThisRun, "_folder", None)
     monkeypatch.setenv("NUMBA_CACHE_DIR", "/of/nobody")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
-    with pytest.raises(DataError, match=r"kept nowhere.*; set NUMBA_CACHE_DIR"):
-        kernel_of(tmp_path / "kernel.py")
+    for _ in range(2):  # (not even temporary files)
+        assert loaded(tmp_path / "kernel.py") == (0, 1)
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     assert loaded(tmp_path / "kernel.py") == (0, 1)
     assert loaded(tmp_path / "kernel.py") == (1, 0)

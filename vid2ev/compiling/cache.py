@@ -30,10 +30,9 @@ from typing import Any
 from numba import config, njit
 from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator, UserWideCacheLocator
 
-from vid2ev.errors import DataError
-
 _HERE = Path(__file__).parent
 _PACKAGE = _HERE.parent
+_CONFIG: Any = config  # (whose attributes are set as numba is imported)
 KERNELS = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "bounds", "stream", "pictures")
 COLOURS = ("pictures",)  # of which functions of many rooms take numbers
 _MARK = uuid.uuid4().hex[:8]
@@ -53,21 +52,21 @@ class InHome(UserWideCacheLocator):  # type: ignore[misc]
 
 class ForThisRun(UserProvidedCacheLocator):  # type: ignore[misc]
     """The last folder that is looked for: one that ends with this process, and that those which it begins find by
-    NUMBA_CACHE_DIR.  Raises DataError where there can be none."""
+    NUMBA_CACHE_DIR.  Where there can be none either, each process compiles for itself."""
 
     _folder: TemporaryDirectory[str] | None = None
 
     @classmethod
     def from_function(cls, py_func: Callable, py_file: str) -> Any:
-        try:
+        with contextlib.suppress(OSError):
             ForThisRun._folder = TemporaryDirectory(prefix="vid2ev_", ignore_cleanup_errors=True)
-        except OSError as error:
-            raise DataError(
-                "compiled kernels can be kept nowhere, not even in a temporary folder; set NUMBA_CACHE_DIR to a folder"
-                " that can be written"
-            ) from error
-        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = ForThisRun._folder.name  # type: ignore[attr-defined]
+            _CONFIG.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = ForThisRun._folder.name
+        _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR or os.devnull  # (in which no folder is, nor can be)
         return super().from_function(py_func, py_file)
+
+    def ensure_cache_path(self) -> None:
+        with contextlib.suppress(OSError):
+            super().ensure_cache_path()
 
 
 def cached(function: Callable) -> Any:
