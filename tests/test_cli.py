@@ -845,6 +845,19 @@ def test_a_full_standard_output_is_one_sentence(unbuffered: str) -> None:
     assert (done.returncode, done.stderr) == (1, said)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere not all bytes are names")
+def test_letters_that_standard_output_lacks_are_printed_as_numbers(tmp_path: Path) -> None:
+    """And the bytes of a name that is no text as these."""
+    (tmp_path / "\u2603\u00fc\udcff.toml").write_text("[dvs]\nthreshold_on = 0.2\n")
+    for encoding, printed in ("latin-1", b"\\u2603\xfc\xff.toml"), ("utf-8", "\u2603\u00fc".encode() + b"\xff.toml"):
+        done = subprocess.run(
+            [sys.executable, "-m", "vid2ev", "sensors", "\u2603\u00fc\udcff.toml"],
+            capture_output=True, timeout=100, cwd=tmp_path, env=os.environ | {"PYTHONIOENCODING": encoding},
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert done.stdout.startswith(printed + b" [dvs]\n")
+
+
 def test_a_dry_run_refuses_a_budget_that_cannot_be_measured(tmp_path: Path) -> None:
     arguments = ["convert", "synthetic:moving-edge", "--stop", "0.05", "--budget", "lsb=1", "-o", str(tmp_path / "a")]
     result = CliRunner().invoke(main, [*arguments, "--dry-run"])

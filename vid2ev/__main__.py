@@ -1,15 +1,27 @@
 """`vid2ev` and `python -m vid2ev`: the command line."""
 
+import codecs
 import io
 import sys
 
 from vid2ev import commands
 
+PRINTABLE = "vid2ev"  # a way with letters that standard output does not have
+
+
+def printable(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Names of files may be any bytes, and are printed as these; of letters that a terminal lacks numbers are."""
+    try:
+        return codecs.lookup_error("surrogateescape")(error)
+    except UnicodeError:
+        return codecs.backslashreplace_errors(error)
+
 
 def main() -> None:
     """The command line; ends with SystemExit."""
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
-        sys.stdout.reconfigure(errors="surrogateescape")  # (names of files may be any bytes, and are printed as these)
+        codecs.register_error(PRINTABLE, printable)
+        sys.stdout.reconfigure(errors=PRINTABLE)
     try:
         commands.main()
     except SystemExit as ended:
