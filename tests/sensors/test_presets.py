@@ -169,6 +169,18 @@ def test_a_file_of_the_other_kind_is_said_to_be_one(kind: Kind, other: Kind, opt
         read_sensor(file, kind)
 
 
+@pytest.mark.parametrize(("kind", "other", "option"), [(DVS, CIS, "--cis"), (CIS, DVS, "--sensor")])
+def test_presets_and_keys_of_the_other_kind_are_said_to_be_its(kind: Kind, other: Kind, option: str) -> None:
+    """Also in the table `set` of a camera, whose keys have no kind before them."""
+    for name in {*other.names()} - {*kind.names()}:
+        with pytest.raises(UsageError, match=rf"^Sensor '{name}' is of another kind, {other.table}: .* {option}, or "):
+            load(kind, name)
+    for key in {*other.spec.model_fields} - {*kind.spec.model_fields}:
+        meant = rf"'{key}' in sensor ideal is unknown \(did you mean {other.table}\.{key}, of cameras of that kind\?\)"
+        with pytest.raises(UsageError, match=meant):
+            load(kind, "ideal", [f"{key}=1"])
+
+
 @pytest.mark.parametrize("name", ["", "../paper", "paper.toml", "no/such.toml", "."])
 def test_what_is_no_sensor_is_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -135,8 +135,7 @@ def read_sensor(name_or_path: str | Path, kind: Kind = DVS) -> SensorFile:
         raise UsageError(f"Sensor file {path} has tables [dvs] and [cis]: expected one sensor; give each its own file.")
     if other:
         raise UsageError(
-            f"Sensor file {path} is of another kind, [{other.table}]: expected a table [{kind.table}]; such a sensor is"
-            f' given with {other.option}, or to a camera of kind "{other.table}" of a rig.'
+            f"Sensor file {path} is of another kind, [{other.table}]: expected a table [{kind.table}]; {_place(other)}."
         )
     if unknown:
         raise UsageError(
@@ -192,8 +191,18 @@ def _find(name_or_path: str, kind: Kind) -> tuple[str, Path]:
         return str(path), path
     if path.suffix == ".toml" or len(path.parts) > 1:
         raise UsageError(f"Sensor file {path} does not exist; give an existing TOML file or one of {_list(names)}.")
+    if other := next((each for each in KINDS if name_or_path in each.names()), None):
+        raise UsageError(
+            f"Sensor '{name_or_path}' is of another kind, {other.table}: expected one of {_list(names)}, or a TOML"
+            f" file; {_place(other)}."
+        )
     hint = nearest(name_or_path, names)
     raise UsageError(f"Sensor '{name_or_path}' is not a preset{hint}; presets are {_list(names)}, or give a TOML file.")
+
+
+def _place(kind: Kind) -> str:
+    """Where a sensor of a kind goes, as a clause."""
+    return f'such a sensor is given with {kind.option}, or to a camera of kind "{kind.table}" of a rig'
 
 
 def _comments(text: str, kind: Kind) -> dict[str, str]:
@@ -223,7 +232,8 @@ def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
     key = str(complaint["loc"][0])
     if complaint["type"] == "extra_forbidden":
         other = next((each for each in KINDS if each is not kind and key in each.spec.model_fields), None)
-        hint = f" (did you mean {other.table}.{key}?)" if other else nearest(key, kind.spec.model_fields)
+        elsewhere = f" (did you mean {other.table}.{key}, of cameras of that kind?)" if other else ""
+        hint = elsewhere or nearest(key, kind.spec.model_fields)
         return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
     default, value = _as_written(kind.spec.model_fields[key].default), reprlib.repr(complaint["input"])
     return f"{key} = {value} {where} is impossible: {first_said(error)} (default {default})."
