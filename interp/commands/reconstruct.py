@@ -105,7 +105,7 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     span_s, seconds = (made["stop_us"] - made["start_us"]) / 1e6, max(run["seconds"], 1e-9)
     return [
         ("made", f"{path}: {counted(made['frames'], 'picture')} of {width}x{height} as {kind}{film_text(made)}"),
-        ("from", f"{made['events']:,} events, {span_s:.6g} s"),
+        ("from", f"{counted(made['events'], 'event')}, {span_s:.6g} s"),
         ("speed", f"{run['frames'] / seconds:.3g} pictures/s, {run['seconds']:.3g} s"),
         *(("warning", text) for text in made["remarks"]),
     ]

@@ -290,6 +290,13 @@ def test_the_size_that_is_said_is_that_of_what_was_made(tmp_path: Path) -> None:
     assert pictures["size"] == [41, 25] and not any("even" in text for text in pictures["remarks"])
 
 
+@pytest.mark.parametrize(("count", "said"), [(1, "from      1 event, "), (1200, "from      1,200 events, ")])
+def test_one_event_is_said_to_be_one(tmp_path: Path, count: int, said: str) -> None:
+    path = written(tmp_path / "a.npz", drawn(count))
+    shown = CliRunner().invoke(command, [str(path), "-o", str(tmp_path / "seen"), "--cutoff", "1", "--fps", "2"])
+    assert shown.exit_code == 0 and said in shown.output
+
+
 def test_a_film_has_all_pictures(tmp_path: Path) -> None:
     path = written(tmp_path / "a.npz", drawn())
     made = reconstruct(path, tmp_path / "a.mp4", cutoff_hz=1, fps=2 * PIECE)
