@@ -49,7 +49,10 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
     "--start", "start_s", type=Finite(), metavar="S",
     help="Begin S seconds after the beginning: from when the file counts, or its first event if that is long after.",
 )  # fmt: skip
-@click.option("--stop", "stop_s", type=Finite(), metavar="S", help="End S seconds after the beginning.")
+@click.option(
+    "--stop", "stop_s", type=Finite(), metavar="S",
+    help="End S seconds after the beginning, with what comes right then.",
+)  # fmt: skip
 @event_options(contrast="0.15")
 @device_option
 @run_options

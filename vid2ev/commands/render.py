@@ -49,7 +49,9 @@ from vid2ev.interrupts import heard
     "--start", "start_s", type=SECONDS, metavar="S",
     help="Begin S seconds after the beginning: from when the file counts, or its first event if that is long after.",
 )  # fmt: skip
-@click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds after the beginning.")
+@click.option(
+    "--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds after the beginning, with what comes right then."
+)
 @click.option(
     "--size",
     type=click.IntRange(64, 8192),
