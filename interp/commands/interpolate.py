@@ -40,8 +40,8 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--fps", metavar="RATE", help="Frames per second of the scene's time: 960, 30000/1001.")
 @click.option(
     "--method", metavar="NAME", help="nearest, linear, flow, or with events integration, both, bridge, ramps, guided;"
-    " of a single frame deblur or integration.  [default: with events the network that comes with vid2ev, guided if"
-    " they are coarse; flow without; of a single frame deblur]",
+    " of a single frame deblur or integration.  [default: with events the network that comes with vid2ev; flow"
+    " without; of a single frame deblur]",
 )  # fmt: skip
 @click.option("--network", metavar="WEIGHTS", help="Of `vid2ev train`, or the name of some that come with vid2ev.")
 @click.option(
