@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
+import av
 import click
 import cv2
 import numpy as np
@@ -22,6 +25,7 @@ from vid2ev.commands.scene import scene
 from vid2ev.recording.flow_files import read_flow
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.scenes import camera_folder
 from vid2ev.scenes import folder as folder_module
 from vid2ev.scenes.camera_folder import Contents
 from vid2ev.scenes.folder import write_scene
@@ -332,6 +336,25 @@ def test_the_preview_is_a_film_of_the_scene() -> None:
     assert len(shown) == 4 and shown[0].shape[:2] == (36, 50)  # (the last row and column are there twice)
     whole = np.pad(cv2.imread("out/000000.png"), ((0, 1), (0, 1), (0, 0)), mode="edge").astype(float)
     assert np.abs(shown[0] - whole).mean() < 12
+
+
+@pytest.mark.parametrize("fps", ["5", "24", "30", "50", "60", "100"])
+def test_the_preview_shows_the_newest_picture_at_each_instant(fps: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = itertools.count()
+    monkeypatch.setattr(camera_folder, "srgb_codes", lambda light: light)
+    monkeypatch.setattr(
+        camera_folder.Reel,
+        "picture",
+        lambda *_: (SimpleNamespace(light=np.full((8, 8, 3), 10 * next(counted), np.uint8)), None),
+    )
+    monkeypatch.setattr(camera_folder, "writer_of", lambda kind: (lambda light, path: None, ".png"))
+    options = ["--size", "8x8", "--duration", "0.2", "--fps", fps]
+    assert vid2ev("scene", "spinning-shapes", "-o", "out", *options).exit_code == 0
+    times_ns = np.loadtxt("out/timestamps.txt")
+    with av.open("out/preview.mp4") as film:
+        shown = [(frame.time, frame.to_ndarray(format="rgb24").mean() / 10) for frame in film.decode(video=0)]
+    newest = [np.searchsorted(times_ns, 1e9 * time_s + 1e9 / 120) - 1 for time_s, _ in shown[:-1]]
+    assert [round(float(number)) for _, number in shown] == [*newest, len(times_ns) - 1]
 
 
 def test_many_scenes_go_on_where_they_stopped(monkeypatch: pytest.MonkeyPatch) -> None:

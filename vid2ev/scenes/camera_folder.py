@@ -121,17 +121,21 @@ class CameraFolder:
             shift = self.world.flow(t_ns, next_ns, picture, *self.camera).shift
             write_flow(self.folder / "flow" / f"{number}.{truth['flow']}", shift)
         if self.contents.preview:
-            self._film.show(picture.light, t_ns)
+            self._film.show(picture.light, next_ns)
         self.count += 1
 
 
 class _Preview(Film):
-    """A film that shows, PREVIEW_FPS times a second, the first picture that is not earlier."""
+    """A film that shows, PREVIEW_FPS times a second, the newest picture: number k that of (k + 1/4) / PREVIEW_FPS s, so
+    that times which are rounded are shown in step.  The last picture is shown once."""
 
     def __init__(self, path: Path, size: tuple[int, int]):
         super().__init__(path, size, PREVIEW_FPS, tag_of("srgb"))
 
-    def show(self, light: np.ndarray, t_ns: int) -> None:
-        """Show the picture, if it is its turn."""
-        while t_ns * PREVIEW_FPS >= self.frames * 10**9:
+    def show(self, light: np.ndarray, next_ns: int | None) -> None:
+        """Show the picture for as long as it is the newest: up to the instant of the next one, if there is one."""
+        if next_ns is None:
+            self.add(srgb_codes(light))
+            return
+        while (4 * self.frames + 1) * 10**9 < 4 * PREVIEW_FPS * next_ns:
             self.add(srgb_codes(light))
