@@ -410,6 +410,22 @@ def test_curves_with_a_knee_are_as_steep_as_they_are(curve: str) -> None:
         assert slope == pytest.approx((bright - dark) / 1e-3 / per_nat, rel=1e-4)
 
 
+@pytest.mark.parametrize("curve", ["offset", "toe", "v2e"])
+def test_while_a_pixel_is_blind_a_signal_goes_no_farther_than_its_light(curve: str) -> None:
+    """However steep it is, and for however long that is; of light of 0.3 nat no event is swallowed by 0.4."""
+    dark = 1e-3 if curve == "offset" else 0.0
+    for dim, bright in ((0.3, 0.4), (0.1, 0.9)):
+        lights = [np.full((4, 4), light, np.float32) for light in (dim, bright)]
+        frames = [Frame(light, k * 1_000_000) for k, light in enumerate(lights)]
+        nat = math.log((bright + dark) / (dim + dark))
+        for bandwidth, blind_us in (("constant", 1e3), ("constant", 1e6), ("light", 1e6)):
+            more = {"refractory_us": blind_us, "bandwidth": bandwidth, "photoreceptor_tau_us": 50.0}
+            spec = clean(log_curve=curve, threshold_on=0.4, threshold_off=0.4, **more)
+            said = EFFECTS["refractory"].omission(scene_of(spec, (4, 4), frames), spec)
+            assert float(said.figure.split()[2]) <= nat * 1.05
+            assert (said.distance == 0.0) == (nat < 0.4)
+
+
 def test_both_poles_give_way_to_the_delay_of_both() -> None:
     """Also where the bound of both is the less, as their delay is nearer to a whole microsecond."""
     frames = [Frame(np.full((16, 16), 0.05 * 1.1**k, np.float32), k * 1_000_000) for k in range(30)]

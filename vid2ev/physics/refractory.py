@@ -5,7 +5,7 @@
 
 What leaving it out changes: none is lost if the signal cannot go a threshold far in the period,
 
-    refractory_us slope_max < least threshold
+    min(refractory_us slope_max, the range of ln(light + dark)) < least threshold
 
 and else at most the share of thresholds that are so low, nor more than follow one that is sent within the period
 (`thresholds.soon`); the memory moves alike (`quantised`).  Events of noise come within the period of others as often as
@@ -35,7 +35,7 @@ from vid2ev.physics.omission import (
     noise_soon,
     omitted,
 )
-from vid2ev.physics.slopes import slopes_at, steepest
+from vid2ev.physics.slopes import farthest, slopes_at, steepest
 from vid2ev.physics.swallowed import swallowed
 from vid2ev.physics.thresholds import soon
 
@@ -54,8 +54,7 @@ class Refractory(BaseModel, frozen=True, extra="forbid"):
 
 def omission(scene: Scene, spec: Any) -> Omission:
     """The refractory period."""
-    slope = float(steepest(scene, spec).max())
-    way = slope * spec.refractory_us * 1e-6
+    way = float(np.minimum(steepest(scene, spec) * spec.refractory_us * 1e-6, farthest(scene, spec)).max())
     figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
     any_other = omitted(scene, spec, math.inf, figure, "", dense=_always_open(scene, spec))
     without = spec.model_copy(update={"refractory_us": 0.0})
