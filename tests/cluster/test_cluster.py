@@ -148,6 +148,30 @@ def test_a_task_that_takes_too_much_memory_is_named_and_the_others_are_done(
     assert begun("takes_all_memory") == 2
 
 
+@pytest.mark.parametrize("why", [OSError(24, "Too many open files"), PermissionError(13, "Permission denied")])
+def test_where_no_processes_can_begin_it_is_said_why(why: OSError, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of those that have no shared memory: Dask says only that they do not, after what the system said."""
+
+    def failing(**_: Any) -> None:
+        try:
+            try:
+                raise why
+            except OSError:
+                raise AssertionError("Status.init")  # noqa: B904
+        except AssertionError as error:
+            raise RuntimeError("Nanny failed to start.") from error
+
+    def lacking(*_: Any) -> None:
+        raise why
+
+    monkeypatch.setattr("vid2ev.cluster.processes.ProcessPoolExecutor", lacking)
+    with pytest.raises(DataError, match=f"can begin here .{why.strerror}."), processes(3):
+        pass
+    monkeypatch.setattr("distributed.LocalCluster", failing)
+    with pytest.raises(DataError, match=f"no processes .* can begin here .{why.strerror}.; .*--jobs 1"):
+        all_of([Task("a", made.gives_its_process)], Workers(2))
+
+
 def test_what_cannot_be_meant_is_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     with (
         pytest.raises(UsageError, match="--memory much: expected a size such as 4GiB"),

@@ -17,19 +17,38 @@ Submit = Callable[..., "Future[Any]"]  # a function that can be imported, and wh
 
 
 @contextmanager
+def if_they_begin() -> Iterator[None]:
+    """What keeps processes from beginning, as few files that may be open or no shared memory, becomes one sentence."""
+    try:
+        yield
+    except (RuntimeError, OSError) as error:  # (Dask has an error of its own for what the system said before it)
+        first: BaseException = error
+        while before := first.__cause__ or first.__context__:
+            first = before
+        if not isinstance(first, OSError):
+            raise
+        raise DataError(
+            f"no processes to share the work with can begin here ({first.strerror or first}); give them what they lack,"
+            " or do without (--jobs 1, or --workers 0 of train)"
+        ) from error
+
+
+@contextmanager
 def processes(count: int, begin: Callable[[], object] | None = None) -> Iterator[Submit]:
     """So many processes, each of which calls `begin` at first; what this yields gives them a task.
 
     Whatever goes wrong within ends it as soon as the tasks that are begun have ended, and Ctrl-C, which a terminal
     sends to all processes and these leave to this one, at once: the others are dropped.  Raises DataError where one of
-    the processes is killed.
+    the processes is killed, or none can begin.
     """
     others = active_children()
     # (processes that are not forked: threads of torch and numba do not survive it)
-    with ProcessPoolExecutor(count, get_context("spawn"), _begun, (begin,)) as pool:
+    with if_they_begin():
+        made = ProcessPoolExecutor(count, get_context("spawn"), _begun, (begin,))
+    with made as pool:
 
         def submit(*task: Any) -> Future[Any]:
-            with born_deaf():
+            with if_they_begin(), born_deaf():
                 return pool.submit(*task)
 
         try:

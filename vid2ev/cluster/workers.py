@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from vid2ev.cluster import deaf
+from vid2ev.cluster.processes import if_they_begin
 from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError
 
@@ -92,8 +93,9 @@ class Workers:
 
         threads = dict.fromkeys(ONE_THREAD_EACH, str(self.threads))
         memory: Any = 1 / self.jobs if self.memory is None else _bytes_of(self.memory)
+        begun = dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries})
         with ExitStack() as ends:
-            with dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries}), deaf.born_deaf():
+            with if_they_begin(), begun, deaf.born_deaf():
                 cluster = ends.enter_context(LocalCluster(
                     n_workers=self.jobs, threads_per_worker=1, memory_limit=memory, host="127.0.0.1",
                     dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},  # (or else one fixed port)
