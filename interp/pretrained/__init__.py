@@ -10,7 +10,6 @@ import os
 from pathlib import Path
 
 from vid2ev.errors import UsageError, nearest
-from vid2ev.untrusted import check_file
 
 OF_RUN = "weights.safetensors"  # of a run of training
 HERE = Path(__file__).parent
@@ -25,6 +24,8 @@ def path_of(weights: str | Path) -> Path:
 
     Raises UsageError where there is no such file, DataError for a pipe or a device.
     """
+    from vid2ev.untrusted import check_file
+
     path = Path(str(weights))
     if os.path.isdir(path):  # (Path.is_dir and Path.exists raise OSError for a name that is too long)
         path = path / OF_RUN
