@@ -431,12 +431,18 @@ def test_files_that_are_none_or_damaged() -> None:
     refused(UsageError, "no such file", "missing.h5")
     Path("text.h5").write_text("t x y p")
     refused(DataError, "no event file", "text.h5")
-    with h5py.File(write(scattered(50)), "r+") as file:
-        file.attrs["width"] = file.attrs["height"] = 4
-    refused(DataError, "4x4 sensor", "events.h5")
     content = Path(write(scattered(600))).read_bytes()
     Path("cut.h5").write_bytes(content[: len(content) // 2])
     refused(DataError, "cut.h5", "cut.h5")
+
+
+def test_events_outside_of_the_sensor_are_left_out_and_counted() -> None:
+    with h5py.File(write(scattered(50)), "r+") as file:
+        outside = int(((file["events/x"][()] >= 4) | (file["events/y"][()] >= 4)).sum())
+        file.attrs["width"] = file.attrs["height"] = 4
+    assert outside > 40
+    said = [f"{outside} events outside of the 4x4 sensor are left out"]
+    assert render("events.h5", "-o", "film.mp4")["warnings"] == said
 
 
 def test_a_place_that_cannot_be_written_is_said_in_a_sentence() -> None:

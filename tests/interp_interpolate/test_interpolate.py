@@ -29,6 +29,7 @@ from interp.interpolate.instants import Instant
 from interp.interpolate.pictures import Pictures
 from interp.interpolate.take import Options, open_take
 from interp.methods import METHODS, open_method
+from interp.methods.one_frame import WAYS
 from interp.networks import make
 from interp.own_codes import shown
 from interp.weights import save
@@ -104,7 +105,9 @@ def test_where_nothing_happens_all_frames_are_the_key_frame(tmp_path: Path, meth
 
 def test_the_help_names_every_method_and_those_that_need_events() -> None:
     shown = next(option.help for option in command.params if option.name == "method").partition(".")[0]
-    frames, events = (re.findall(r"\w+", part) for part in shown.split(" or with events "))
+    of_two, of_one = shown.split("; of a single frame ")
+    assert of_one.split(" or ") == list(WAYS)
+    frames, events = (re.findall(r"\w+", part) for part in of_two.split(" or with events "))
     needs = dict.fromkeys(frames, False) | dict.fromkeys(events, True)
     assert needs == {name: open_method(name).needs_events for name in METHODS}
 
