@@ -89,7 +89,9 @@ def drawn(means_px: Sequence[float], scores: np.ndarray, names: Sequence[str]) -
     axis = figure.subplots()
     for name, of in zip(names, scores.T, strict=True):
         axis.plot(means_px, of, color=INK, marker="o", markersize=3, linewidth=1.1)
-        axis.annotate(name, (means_px[0], of[0]), (0, 5), textcoords="offset points", color=INK, fontsize=8)
+        above = [other for other in scores[0] if 0 < other - of[0] < 0.1 * np.ptp(scores[0])]
+        place = (0, -12) if above else (0, 5)  # (below, where another line is close above)
+        axis.annotate(name, (means_px[0], of[0]), place, textcoords="offset points", color=INK, fontsize=8)
     axis.set_xlabel("mean disparity [px]", color=INK)
     axis.set_ylabel("PSNR [dB]", color=INK)
     axis.spines[["top", "right"]].set_visible(False)
