@@ -13,10 +13,9 @@ import torch
 
 from interp.candidates.guided import flows_to, guided
 from interp.light import Transfer
+from interp.representation.carried import ALL, Part
 
 AGAIN = 1  # times that motion is sought once more
-Part = tuple[slice, slice]
-ALL: Part = slice(None), slice(None)
 
 
 @dataclass(frozen=True, slots=True)

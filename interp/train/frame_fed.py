@@ -37,17 +37,19 @@ class FrameFedLearner(Learner):
 
     def made(self, batch: Batch) -> Interpolated:
         """What the network makes of a batch: where it matters, of events that are as coarse as each other at a time."""
-        footprints = batch["footprint"]
-        if not self.network.spec.guided or bool((footprints == footprints[0]).all()):
+        if not self.network.spec.guided:
             return self._made(batch)
-        order = footprints.argsort(stable=True)
-        groups = order.split(footprints.unique(return_counts=True)[1].tolist())
-        made = [self._made({name: each[group] for name, each in batch.items()}) for group in groups]
+        footprints, counts = batch["footprint"].unique(return_counts=True)
+        if len(footprints) == 1:
+            return self._made(batch, int(footprints))
+        order = batch["footprint"].argsort(stable=True)
+        groups = zip(footprints.tolist(), order.split(counts.tolist()), strict=True)
+        made = [self._made({name: each[some] for name, each in batch.items()}, wide) for wide, some in groups]
         return joined(made, order.argsort())
 
-    def _made(self, batch: Batch) -> Interpolated:
+    def _made(self, batch: Batch, footprint: int = 1) -> Interpolated:
         first, last = batch["frames"].unbind(1)
-        return self.network(first, last, batch["times"], events_of(batch))
+        return self.network(first, last, batch["times"], events_of(batch, footprint))
 
     def parts(self, batch: Batch) -> objectives.Terms:
         """Terms of the loss."""
@@ -94,12 +96,12 @@ class FrameFedLearner(Learner):
         )
 
 
-def events_of(batch: Batch) -> EventCounts:
-    """The events of a batch, all as coarse as those of the first."""
-    return EventCounts(batch["off_on"], batch["contrast"], int(batch["footprint"][0]))
+def events_of(batch: Batch, footprint: int = 1) -> EventCounts:
+    """The events of a batch; `footprint` is that of all of them, where it matters."""
+    return EventCounts(batch["off_on"], batch["contrast"], footprint)
 
 
 def gap_of(clip: Batch) -> Gap:
     """The only pair of frames of a batch."""
     first, last = clip["frames"][0]
-    return Gap(first, last, events_of(clip))
+    return Gap(first, last, events_of(clip, int(clip["footprint"])))
