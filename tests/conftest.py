@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+from collections.abc import Callable
+from typing import Any
 
+import pytest
 from hypothesis import settings
 
 # (tests say nothing of how long things take: the first example of many compiles kernels)
@@ -16,3 +20,15 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # (what a program says on a slow machine is what it says on any: tqdm shows nothing where no terminal is)
 os.environ["TQDM_DISABLE"] = "1"
+
+
+@pytest.fixture
+def asks_again(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """From when this is called on, Ctrl-C comes as a folder is cleared up."""
+    remove = shutil.rmtree
+
+    def asked(*arguments: Any, **options: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        remove(*arguments, **options)
+
+    return lambda: monkeypatch.setattr(shutil, "rmtree", asked)

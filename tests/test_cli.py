@@ -585,21 +585,19 @@ def test_of_a_recording_that_is_in_its_place_it_is_not_said_that_nothing_is_left
 
 
 @pytest.mark.parametrize("piece", [1, conversion.PIECE])
-def test_who_asks_twice_to_end_hears_what_is_left(piece: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_asks_twice_to_end_hears_what_is_left(
+    piece: int, monkeypatch: pytest.MonkeyPatch, asks_again: Callable[[], None]
+) -> None:
     """The second time while it is cleared up."""
-    remove, of_recipe = shutil.rmtree, instants._instants
+    of_recipe = instants._instants
 
     def interrupted(*asked: Any) -> Iterator[Instant]:
         yield from islice(of_recipe(*asked), 5)
         raise KeyboardInterrupt
 
-    def asked_again(*arguments: Any, **options: Any) -> None:
-        signal.raise_signal(signal.SIGINT)
-        remove(*arguments, **options)
-
     monkeypatch.setitem(conversion.convert.__kwdefaults__, "piece", piece)
     monkeypatch.setattr(instants, "_instants", interrupted)
-    monkeypatch.setattr(shutil, "rmtree", asked_again)
+    asks_again()
     result = vid2ev("convert", CLIP, "-o", "out", *QUICK)
     kept = piece == 1
     assert (result.exit_code, result.stderr.count("\n")) == (130, 1)

@@ -6,12 +6,11 @@ import json
 import math
 import os
 import shutil
-import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -231,17 +230,14 @@ def test_links_and_pipes_are_not_replaced(recording: Path) -> None:
         assert Path(name).lstat().st_ino == before
 
 
-def test_who_asks_twice_to_end_leaves_nothing(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_asks_twice_to_end_leaves_nothing(
+    recording: Path, monkeypatch: pytest.MonkeyPatch, asks_again: Callable[[], None]
+) -> None:
     """The second time while it is cleared up."""
-    remove = shutil.rmtree
-
-    def asked_again(*arguments: Any, **options: Any) -> None:
-        signal.raise_signal(signal.SIGINT)
-        remove(*arguments, **options)
 
     def interrupted(path: Path, recording: Recording) -> None:
         path.write_bytes(b"half")
-        monkeypatch.setattr(shutil, "rmtree", asked_again)
+        asks_again()
         raise KeyboardInterrupt
 
     kind = format_named("csv")

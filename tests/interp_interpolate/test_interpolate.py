@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
-import signal
 import sys
+from collections.abc import Callable
 from dataclasses import fields, replace
 from fractions import Fraction
 from inspect import signature
@@ -414,17 +413,12 @@ def test_a_pipe_is_not_replaced_by_a_film(tmp_path: Path) -> None:
 
 
 def test_who_asks_twice_to_end_leaves_nothing_where_nothing_is_done(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asks_again: Callable[[], None]
 ) -> None:
     """The second time while it is cleared up."""
-    remove = shutil.rmtree
-
-    def asked_again(*arguments: Any, **options: Any) -> None:
-        signal.raise_signal(signal.SIGINT)
-        remove(*arguments, **options)
 
     def interrupted(*_: object) -> None:
-        monkeypatch.setattr(shutil, "rmtree", asked_again)
+        asks_again()
         raise KeyboardInterrupt
 
     source = images(tmp_path / "in", moving(2))

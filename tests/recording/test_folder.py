@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -257,16 +257,10 @@ def test_who_is_asked_to_end_while_it_begins_leaves_nothing(tmp_path: Path, monk
 
 
 def test_who_asks_twice_to_end_leaves_nothing_of_what_was_to_be_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, asks_again: Callable[[], None]
 ) -> None:
     """The second time while it is cleared up."""
-    remove = shutil.rmtree
-
-    def asked_again(*arguments: Any, **options: Any) -> None:
-        signal.raise_signal(signal.SIGINT)
-        remove(*arguments, **options)
-
-    monkeypatch.setattr(shutil, "rmtree", asked_again)
+    asks_again()
     with pytest.raises(KeyboardInterrupt), whole(tmp_path / "scene") as made:
         made.mkdir()
         (made / "000000.png").touch()
