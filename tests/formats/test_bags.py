@@ -259,10 +259,34 @@ def test_the_time_of_libcaer_begins_anew_within_a_packet(tmp_path: Path, kind: s
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_packets_count_from_the_same_instant_in_any_encoding(tmp_path: Path, kind: str) -> None:
+    base_ns = 1_744_227_144_732_712_000  # as drivers have it: the clock's time of the packet's first event
+    stored = {
+        "libcaer_cmp": np.array([0x0001, 0x1002, 0x2003, 0x3804], "<u2").tobytes(),
+        "libcaer": struct.pack("<Ii", 3 << 17 | 4 << 2 | 1 << 1 | 1, 4098),
+        "mono": struct.pack("<Q", 1 << 63 | 4 << 48 | 3 << 32 | 4_098_000),
+    }
+    for encoding, content in stored.items():
+        (tmp_path / encoding).mkdir()
+        (events,) = read_events(packet_bag(tmp_path / encoding, kind, encoding, [(base_ns, content)]))
+        found = [column.tolist() for column in (events.t, events.x, events.y, events.p)]
+        assert found == [[base_ns // 1000 + 4098], [3], [4], [1]]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_packet_beyond_what_nanoseconds_hold_is_refused(tmp_path: Path, kind: str) -> None:
+    for encoding in ("libcaer_cmp", "libcaer", "mono"):
+        (tmp_path / encoding).mkdir()
+        path = packet_bag(tmp_path / encoding, kind, encoding, [(1 << 63, bytes(8))])
+        with pytest.raises(DataError, match="cannot be read as a bag"):
+            list(read_events(path))
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_words_of_libcaer_begin_anew_in_time_but_not_in_place(tmp_path: Path, kind: str) -> None:
     first = np.array([0x0001, 0x1002, 0x2003, 0x3804, 0x1005, 0x480A, 0x5081, 0x5001, 0x6FFF], "<u2")
     second = np.array([0x1001, 0x3005, 0x5080], "<u2")
-    path = packet_bag(tmp_path, kind, "libcaer_cmp", [(10**6, first.tobytes()), (2 * 10**6, second.tobytes())])
+    path = packet_bag(tmp_path, kind, "libcaer_cmp", [(10**9, first.tobytes()), (2 * 10**9, second.tobytes())])
     events = Events.concatenate(read_events(path))
     assert events.t.tolist() == [1_004_098, 1_004_101, 1_004_101, 1_004_101, 2_000_001, 2_000_001]
     assert (events.x.tolist(), events.y.tolist()) == ([3] * 6, [4, 10, 17, 18, 5, 33])

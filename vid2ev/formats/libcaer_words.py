@@ -1,7 +1,7 @@
 """Words of `libcaer_cmp`, in which the ROS drivers of iniVation's cameras pack events.
 
     word   [12:16] type, [0:12] value
-    0, 1   the upper and the lower 12 bits of the time since the packet's time_base [us]
+    0, 1   the upper and the lower 12 bits of the time since the packet's time_base, in us
     2      column
     3      [0:11] row, [11] p: an event
     4      [0:11] row, [11] p: of the vector that follows

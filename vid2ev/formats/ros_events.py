@@ -4,7 +4,7 @@ Of topics with events the first is read.  Times of `dvs_msgs/EventArray` are abs
 those of the sensor, as its encoding says:
 
     evt3         words of EVT3 (`evt3_words.py`); time_base means nothing, times count from the words' first wrap
-    libcaer_cmp  words from time_base [us] on (`libcaer_words.py`)
+    libcaer_cmp  words from time_base [ns] on (`libcaer_words.py`)
     libcaer      uint32: [1] p, [2:17] y, [17:32] x; int32 t [us] from time_base [ns]
     mono         uint64: [0:32] t [ns] from time_base, [32:48] x, [48:63] y, [63] p
 
@@ -12,7 +12,8 @@ What is written is an EventArray for each 10 ms with events.  The stamp of the f
 recording counts; that of the others is their first event.  Cameras stamp as they like: a stamp after the first event,
 or more than a day before it, is not taken for that instant, but the first event is.
 
-Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-camera/event_camera_codecs
+Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-camera/event_camera_codecs,
+https://github.com/ros-event-camera/libcaer_driver
 """
 
 from __future__ import annotations
@@ -159,24 +160,29 @@ class _Words:
         if packet.encoding == "evt3":
             _, found = evt3_words.decode(self.state, self.left, 0, words, *self.size, t, x, y, p)
         else:
-            found = libcaer_words.decode(words, packet.time_base & (1 << 62) - 1, self.place, t, x, y, p)
+            found = libcaer_words.decode(words, _base_us(packet), self.place, t, x, y, p)
         return Events(t[:found].copy(), x[:found].copy(), y[:found].copy(), p[:found].copy())
+
+
+def _base_us(packet: EventPacket) -> int:
+    if packet.time_base >> 63:
+        raise ValueError("a time beyond 2262")
+    return packet.time_base // 1000
 
 
 def _unpacked(packet: EventPacket, path: Path) -> Events:
     """The events of a packet of 8 bytes each."""
     words = np.frombuffer(packet.content, "<u8", len(packet.content) // 8)
     low, high = words & 0xFFFFFFFF, words >> 32
-    if packet.time_base >> 63:
-        raise ValueError("a time beyond 2262")
+    base_us = _base_us(packet)
     if packet.encoding == "mono":
-        t = (packet.time_base + low.astype(np.int64)) // 1000
+        t = base_us + (packet.time_base % 1000 + low.astype(np.int64)) // 1000
         return _columns(t, high & 0xFFFF, high >> 16 & 0x7FFF, high >> 31)
     if packet.encoding == "libcaer":
         after = high.astype(np.int64)
         # The time of libcaer has 31 bits: where it goes back by half of that, it has begun anew.
         after[1:] += np.cumsum(np.diff(after) < -(1 << 30)) << 31
-        return _columns(packet.time_base // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
+        return _columns(base_us + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
     raise DataError(
         f"{path} holds events in the encoding '{packet.encoding}'; expected evt3, libcaer_cmp, libcaer or mono, so"
         " convert it with event_camera_tools first"

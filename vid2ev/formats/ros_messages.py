@@ -53,7 +53,7 @@ class EventPacket:
     """Events as a camera's driver packed them."""
 
     size: tuple[int, int]
-    time_base: int  # in the unit of the encoding
+    time_base: int  # [ns]; of evt3 it means nothing
     encoding: str
     content: bytes
 
