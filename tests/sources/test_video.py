@@ -512,6 +512,16 @@ def test_a_file_without_its_index_is_refused(encode) -> None:
         open_source(path)
 
 
+def test_noise_of_an_encrypted_file_is_no_video(encode) -> None:
+    """Raw codes decode into pictures whatever they are."""
+    key = {"encryption_scheme": "cenc-aes-ctr", "encryption_key": "5c" * 16, "encryption_kid": "a7" * 16}
+    frames = [av.VideoFrame.from_ndarray(np.full((24, 32, 3), 20 * k, np.uint8), format="rgb24") for k in range(8)]
+    assert len(list(open_source(encode("open.mov", frames, codec="rawvideo")).frames())) == 8
+    locked = encode("locked.mov", frames, codec="rawvideo", container_options=key)
+    with pytest.raises(DataError, match=r"locked\.mov: no frame .*encrypted packets left out: 8; ffmpeg"):
+        open_source(locked)
+
+
 def test_damage_in_the_middle_costs_only_what_is_damaged(encode) -> None:
     path = encode("a.avi", noisy(20))
     whole = list(open_source(path).frames())

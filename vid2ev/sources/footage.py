@@ -72,9 +72,7 @@ class VideoFile:
             self.rate, self.pixel_shape, self.codec, self.streams = _said_of(stream)
             self.planned = _announced(container, stream)
             self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
-            self.first = next(_decoded(container, stream, self.planned, []), None)
-            if self.first is None:
-                raise DataError(f"{self.path}: no frame in it can be decoded; {REMEDY}")
+            self.first = _first(container, stream, self.planned, self.name, REMEDY)
             self.end_s = announced_end_s(container, stream, stamp_of(self.first) or Fraction(0))
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
@@ -134,10 +132,8 @@ class Piped:
         self.name, self.kept = kept.name, kept
         with self._opened(kept.reader()) as (container, stream):
             self.rate, self.pixel_shape, self.codec, self.streams = _said_of(stream)
-            self.first = next(_decoded(container, stream, 0, []), None)
+            self.first = _first(container, stream, 0, self.name, f"pipe {STREAMS} into it")
             kept.wanted = False
-            if self.first is None:
-                raise DataError(f"{self.name}: no frame in it can be decoded; pipe {STREAMS} into it")
             self.end_s = announced_end_s(container, stream, stamp_of(self.first) or Fraction(0))
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
@@ -274,6 +270,16 @@ def _sought(
     return chain([first], coming)
 
 
+def _first(container: Any, stream: Any, planned: int, name: str, remedy: str) -> Any:
+    """The first picture.  Raises DataError if there is none."""
+    remarks: list[str] = []
+    picture = next(_decoded(container, stream, planned, remarks), None)
+    if picture is None:
+        because = f" ({remarks[0]})" if remarks else ""
+        raise DataError(f"{name}: no frame in it can be decoded{because}; {remedy}")
+    return picture
+
+
 def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """Decoded pictures in order of presentation; what could not be read is told in `remarks` at the end."""
     pictures = _of_packets(container, stream, planned, remarks)
@@ -283,13 +289,16 @@ def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> I
 
 def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """As `_decoded`, with the stamps that the decoder gives them."""
-    whole = broken = guessed = sound = unsound = places = 0
+    whole = broken = locked = guessed = sound = unsound = places = 0
     checked = stream.codec_context.name == "ffv1"
     for packet in _packets(container, stream, remarks):
         if stream.container.format.name == "avi" and packet.dts is not None:
             places = packet.dts + 1  # (some are empty: frames that were dropped when it was recorded)
         if packet.is_corrupt:  # (cut off in the middle; the decoder would invent the rest)
             broken += 1
+            continue
+        if packet.has_sidedata("encryption_info"):  # (some decoders make pictures of that, too)
+            locked += 1
             continue
         whole += packet.size > 0 and not packet.is_discard  # (what an edit list hides leads to what it shows)
         if checked and packet.size:
@@ -305,10 +314,14 @@ def _of_packets(container: Any, stream: Any, planned: int, remarks: list[str]) -
     guessed += unsound if sound else 0  # (where none is right, there are no checksums)
     if guessed:
         remarks.append(f"damaged pictures, which the decoder has guessed with those that build on them: {guessed}")
+    if locked:
+        remarks.append(
+            f"encrypted packets left out: {locked}; ffmpeg -decryption_key KEY -i VIDEO -c copy OTHER decrypts them"
+        )
     if broken:
         remarks.append(f"damaged packets of the file left out: {broken}")
-    if max(whole + broken, places) < planned:
-        remarks.append(f"truncated: the file holds {whole} of the {planned} frames it announces")
+    if max(whole + broken + locked, places) < planned:
+        remarks.append(f"truncated: the file holds {whole + locked} of the {planned} frames it announces")
 
 
 def _packets(container: Any, stream: Any, remarks: list[str]) -> Iterator[Any]:
