@@ -365,6 +365,27 @@ def test_an_animation_is_a_video_of_the_light_of_its_pictures(tmp_path: Path, su
     (tmp_path / "b.png").write_bytes(cv2.imencode(".jpg", codes((16, 16)))[1].tobytes())
 
 
+@pytest.mark.parametrize("mode", ["RGB", "RGBA"])
+def test_what_moves_in_an_avif_is_read_and_not_the_still_beside_it(tmp_path: Path, mode: str) -> None:
+    scenes = [Image.fromarray(np.full((24, 32, 3), 60 * k + 30, np.uint8)).convert(mode) for k in range(4)]
+    if mode == "RGBA":  # (otherwise its writer leaves transparency out)
+        for scene in scenes:
+            scene.putalpha(128)
+    scenes[0].save(tmp_path / "a.avif", save_all=True, append_images=scenes[1:], duration=[40, 80, 40, 40])
+    source = open_source(tmp_path / "a.avif")
+    frames = list(source.frames())
+    assert [frame.t_ns // 10**6 for frame in frames] == [0, 40, 120, 160]
+    expected = code_table("srgb", 8)[np.arange(4) * 60 + 30]
+    np.testing.assert_allclose([frame.light.mean() for frame in frames], expected, rtol=0.05)
+    assert len(source.warnings) == (mode == "RGBA")
+
+
+def test_a_still_avif_is_a_single_picture(tmp_path: Path) -> None:
+    Image.fromarray(np.full((24, 32, 3), 30, np.uint8)).save(tmp_path / "a.avif")
+    with pytest.raises(UsageError, match="single picture, of a kind that is not read; make a PNG"):
+        open_source(tmp_path / "a.avif")
+
+
 def test_motion_jpeg_goes_by_its_name(tmp_path: Path) -> None:
     jpeg = cv2.imencode(".jpg", codes((16, 16)))[1].tobytes()
     (tmp_path / "a.mjpg").write_bytes(jpeg * 5)

@@ -117,7 +117,10 @@ class VideoFile:
                 )
             if container.format.name.endswith("_pipe"):
                 raise UsageError(f"{self.path}: a single picture; give the folder that holds the sequence")
-            yield container, video_stream(container, self.name)
+            stream = video_stream(container, self.name)
+            if _is_still(stream):
+                raise UsageError(f"{self.path}: a single picture, of a kind that is not read; make a PNG or TIFF of it")
+            yield container, stream
 
 
 class Piped:
@@ -197,8 +200,14 @@ def video_stream(container: Any, name: str) -> Any:
 
 
 def _video_streams(container: Any) -> list[Any]:
-    """Those that are no cover pictures."""
-    return [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
+    """Those that are no cover pictures, nor stills beside what moves (of animated AVIF)."""
+    streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
+    return [s for s in streams if not _is_still(s)] or streams
+
+
+def _is_still(stream: Any) -> bool:
+    """Whether it is an item of HEIF, such as AVIF and HEIC: a picture, part of one, its transparency or its preview."""
+    return stream.time_base == 1 and stream.duration is None and "mp4" in stream.container.format.name.split(",")
 
 
 def _said_of(stream: Any) -> tuple[Fraction | None, Fraction, str, int]:
