@@ -92,6 +92,17 @@ def test_adaptation_is_bradford() -> None:
     np.testing.assert_allclose(matrix, published, atol=3e-4)
 
 
+@pytest.mark.parametrize("tag", CHROMATICITIES)
+def test_colours_are_the_same_written_as_amounts_of_xyz(tag: int) -> None:
+    """The primaries of XYZ itself, two of which have no luminance, as OpenEXR's example `XYZ.exr` has them."""
+    x, y = np.transpose([*CHROMATICITIES[tag][:3], (1 / 3, 1 / 3)])
+    corners = np.array([x, y, 1 - x - y])[:, :3]
+    to_xyz = corners * np.linalg.solve(corners, np.ones(3))
+    _, from_xyz = primaries_at([(1, 0), (0, 1), (0, 0), (1 / 3, 1 / 3)])
+    _, from_rgb = primaries_at(list(zip(x, y, strict=True)))
+    np.testing.assert_allclose(from_xyz @ to_xyz, from_rgb, atol=1e-9)
+
+
 def test_primaries_that_mix_no_white() -> None:
     for places in ([(0.3, 0.3)] * 4, [(0.6, 0.3), (0.3, 0.6), (0.1, 0.1), (0.3, 0.0)], [(np.nan, 0.1)] * 4):
         with pytest.raises(ValueError, match="no white"):

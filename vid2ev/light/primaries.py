@@ -71,11 +71,9 @@ def primaries_at(places: Sequence[Place]) -> Primaries:
 
 def _to_xyz(places: Sequence[Place]) -> tuple[np.ndarray, np.ndarray]:
     """The matrix to XYZ, and XYZ of white."""
-    with np.errstate(all="ignore"):
-        red, green, blue, white = (
-            np.array([x / y if y else np.inf, 1.0, (1 - x - y) / y if y else 0]) for x, y in places
-        )
+    with np.errstate(all="ignore"):  # (a primary without luminance, as of XYZ itself, is in another unit)
+        red, green, blue, white = (np.array([x / y, 1.0, (1 - x - y) / y] if y else [x, y, 1 - x]) for x, y in places)
         corners = np.stack([red, green, blue], axis=1)
-        if not np.all(np.isfinite(corners)) or abs(np.linalg.det(corners)) < 1e-9 or not np.all(np.isfinite(white)):
+        if not np.all(np.isfinite([red, green, blue, white])) or abs(np.linalg.det(corners)) < 1e-9 or not white[1]:
             raise ValueError(f"the chromaticities {list(places)} mix no white")
     return corners * np.linalg.solve(corners, white), white
