@@ -386,6 +386,16 @@ def test_hdf5_of_v2e(tmp_path: Path) -> None:
     assert file.size is None and file.start_us == 0
 
 
+@pytest.mark.parametrize("table", [
+    np.zeros(3, [(name, "i8") for name in "txyp"]), np.zeros((3, 3), np.uint32), np.zeros((3, 4)),
+], ids=["fields", "three columns", "fractions"])  # fmt: skip
+def test_hdf5_with_a_table_of_another_kind_says_how_it_becomes_one(tmp_path: Path, table: np.ndarray) -> None:
+    with h5py.File(tmp_path / "mine.h5", "w") as file:
+        file["events"] = table
+    with pytest.raises(DataError, match=r"mine\.h5 has events that .*h5py\.File, .*savez\('mine\.npz', t=t, x=x"):
+        next(read_events(tmp_path / "mine.h5"))
+
+
 def test_hdf5_that_says_it_holds_more_than_it_does(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "table.h5", "w") as file:
         file.create_dataset("events", (10**12, 4), np.uint32, chunks=(1000, 4))

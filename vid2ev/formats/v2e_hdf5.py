@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.columns import pixels, whole_us
+from vid2ev.formats.columns import pixels, saved_as_arrays, whole_us
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.hdf5_file import (
     MAGIC,
@@ -97,14 +97,16 @@ def _check(file: h5py.File, path: Path) -> None:
     check_links(file, path, ["events"])
     table = file.get("events")
     if not isinstance(table, h5py.Dataset) or table.ndim != 2 or not COLUMNS <= table.shape[1] <= COLUMNS + 1:
-        raise DataError(f"{path} has no table of events with 4 columns; expected the HDF5 of v2e")
+        how = saved_as_arrays(path, "h5py.File")
+        raise DataError(f"{path} has events that are no table of 4 columns, as v2e's are; {how}")
     if not is_inside(table, path):
         raise DataError(f"{path}: its events are in another file; expected one file, so copy them into it (h5repack)")
     check_chunks(table, path)
     if not is_whole(table):
         raise DataError(f"{path} is damaged: parts of its events are missing; get another copy")
     if table.dtype.kind not in "iu":
-        raise DataError(f"{path} has events that are no whole numbers ({table.dtype}); expected the HDF5 of v2e")
+        how = saved_as_arrays(path, "h5py.File")
+        raise DataError(f"{path} has events that are no whole numbers, as v2e's are, but {table.dtype}; {how}")
 
 
 FORMAT = Format(
