@@ -15,6 +15,7 @@ from vid2ev.cost.ladder import Given, Ladder, ladder_of, steps_of
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError
 from vid2ev.seen.recipe import Recipe
+from vid2ev.sensors.cis_spec import CisSpec
 
 CLIP = "synthetic:moving-edge,size=48x32,duration_s=0.1"
 
@@ -147,11 +148,25 @@ def test_frame_cameras_have_their_own() -> None:
     found = ladder(frame_camera=True, cis="phone")
     rungs = {rung.name: rung for rung in found.rungs}
     assert rungs["lines together"].settings == {"cis.line_us": 0.0}
-    assert rungs["frames of an instant"].settings == {"cis.exposure_us": 0.0}
+    assert rungs["frames of an instant"].settings == {"cis.blur": False}
     assert rungs["frames without noise"].settings
     assert "half the size" not in rungs
     fixed = ladder(frame_camera=True, cis="phone", overrides=["cis.line_us=10"])
     assert "lines together" not in names(fixed)
+    for overrides in (["cis.blur=false"], ["cis.blur=true"], ["cis.exposure_us=0"]):
+        assert "frames of an instant" not in names(ladder(frame_camera=True, overrides=overrides))
+
+
+def test_frames_of_an_instant_are_those_of_the_same_times() -> None:
+    """As many, open as long: what is left of an exposure is the light in its middle."""
+    options = {"video": CLIP, "frame_camera": True, "cis": "phone"}
+    rung = next(rung for rung in ladder(**options).rungs if rung.name == "frames of an instant")
+    (one,), (other,) = (
+        [mount.sensor.spec for mount in Recipe.of(**each).mounts if isinstance(mount.sensor.spec, CisSpec)]
+        for each in (options, rung.applied(options))
+    )
+    assert other != one and other.window_us(1080) == one.window_us(1080)
+    assert {*one.effects()} - {*other.effects()} == {"exposure"}
 
 
 def test_a_plane_stands_for_depth(tmp_path: Path) -> None:

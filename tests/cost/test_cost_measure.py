@@ -157,7 +157,11 @@ def test_each_pass_is_told_of_in_advance(clip: str) -> None:
 
 
 def test_frames_are_compared_in_codes_of_the_same_camera(clip: str) -> None:
-    fixed = {"upsample": "none", "given": ("upsample",), "overrides": ["cis.frame_rate_hz=40", "timing=linear"]}
+    fixed = {
+        "upsample": "none",
+        "given": ("upsample",),
+        "overrides": ["cis.frame_rate_hz=40", "cis.exposure_us=17000", "timing=linear"],
+    }
     found = measured(clip, clock=ticks(), frame_camera=True, **SIMPLE | fixed)
     errors = {row.rung.name: row.errors for row in found.rows}
     assert errors["default"].rms_lsb == 0

@@ -155,9 +155,10 @@ def _effects(dvs: list[DvsSpec], given: Given) -> list[Rung]:
 
 
 def _frames(cis: list[CisSpec], given: Given) -> list[Rung]:
-    ways = {
+    blurred = any("exposure" in spec.effects() for spec in cis)
+    ways: dict[str, dict[str, Any]] = {
         "frames without noise": {f"cis.{key}": value for key, value in NOISELESS.items()},
-        "frames of an instant": {"cis.exposure_us": 0.0},
+        "frames of an instant": {"cis.blur": False} if blurred else {},
         "lines together": {"cis.line_us": 0.0},
     }
     found = []
