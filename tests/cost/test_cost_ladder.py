@@ -157,6 +157,13 @@ def test_frame_cameras_have_their_own() -> None:
         assert "frames of an instant" not in names(ladder(frame_camera=True, overrides=overrides))
 
 
+def test_effects_of_frame_cameras_alone_are_in_play_too(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "cis"\n')
+    ways = {"effects auto", "effects none"}
+    for cis, there in (("phone", ways), ("ideal", set())):
+        assert names(ladder(("rig",), rig=tmp_path / "rig.toml", cis=cis)) & ways == there
+
+
 def test_frames_of_an_instant_are_those_of_the_same_times() -> None:
     """As many, open as long: what is left of an exposure is the light in its middle."""
     options = {"video": CLIP, "frame_camera": True, "cis": "phone"}

@@ -76,7 +76,7 @@ def ladder_of(recipe: Recipe, given: Given, steps: int) -> Ladder:
         "light": _light(recipe, given, steps),
         "timing": [] if given.any("timing") else _timing(dvs),
         "filter": [] if given.any("filter") else _filter(dvs),
-        "effects": [] if given.any("effects") else _effects(dvs, given),
+        "effects": [] if given.any("effects") else _effects([*dvs, *cis], given),
         "frames": _frames(cis, given),
         "views": _views(recipe),
         "size": _size(recipe, given),
@@ -147,8 +147,8 @@ def _filter(dvs: list[DvsSpec]) -> list[Rung]:
     return [Rung(f"filter {other} log", "filter", settings={"filter": other})]
 
 
-def _effects(dvs: list[DvsSpec], given: Given) -> list[Rung]:
-    if not any(spec.effects() for spec in dvs):
+def _effects(specs: list[DvsSpec | CisSpec], given: Given) -> list[Rung]:
+    if not any(spec.effects() for spec in specs):
         return []
     rungs = [Rung(f"effects {word}", "effects", {"effects": word}) for word in ("auto", "none")]
     return [rung for rung in rungs if not given.any(rung.name)]
