@@ -248,6 +248,11 @@ def test_rigs_camera_by_camera() -> None:
         compare("one", "three")
     with pytest.raises(UsageError, match="of the cameras aps, left, right; give one: one/left or one/right"):
         compare("one", "two/left")
+    rig = Rig(source=Source(fov_deg=60.0), cameras=(Camera(name="aps", kind="cis"),))
+    convert(clip, "frames", rig=rig, upsample="none", threads=1, preview=False)
+    for rigs in (("frames", "frames"), ("frames", "one"), ("one", "frames")):
+        with pytest.raises(UsageError, match=r"^frames has frame cameras alone.* give a rig with event cameras$"):
+            compare(*rigs)
     shutil.rmtree("one/right")
     assert compare("two/left", "one")["distance"] == compare("two/left", "one/left")["distance"] > 0
     assert compare("one/left", "two/left")["distance"] == found["left"]["distance"]

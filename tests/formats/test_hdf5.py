@@ -346,3 +346,6 @@ def test_of_a_recording_the_folder_with_events_is_named(tmp_path: Path) -> None:
     (tmp_path / "dvs" / "events.h5").touch()
     with pytest.raises(UsageError, match=r"of the cameras cis, dvs; give one: .*dvs$"):
         open_events(tmp_path)
+    (tmp_path / "dvs" / "events.h5").unlink()
+    with pytest.raises(UsageError, match=r"frames of cis, dvs and no events; give a recording of an event camera$"):
+        open_events(tmp_path)

@@ -13,17 +13,20 @@ def pairs(recording: str | Path, reference: str | Path) -> dict[str, tuple[Path,
     """What to compare with what: the event cameras of two rigs by their names, or else the two themselves, as '', of a
     rig with one event camera that one.
 
-    Raises UsageError for rigs whose event cameras have other names.
+    Raises UsageError for rigs whose event cameras have other names, or that have none.
     """
     one, other = Path(recording), Path(reference)
     if not (is_rig(one) and is_rig(other)):
         one, other = (of_only_camera(path) if is_rig(path) else path for path in (one, other))
         return {"": (one, other)}
     names, other_names = event_cameras(one), event_cameras(other)
-    if names != other_names or not names:
+    for rig, found in ((one, names), (other, other_names)):
+        if not found:
+            raise UsageError(f"{rig} has frame cameras alone, and events are compared; give a rig with event cameras")
+    if names != other_names:
         raise UsageError(
-            f"{one} has the event cameras {', '.join(names) or '(none)'}, {other} has"
-            f" {', '.join(other_names) or '(none)'}; give two rigs with the same names, or two cameras"
+            f"{one} has the event cameras {', '.join(names)}, {other} has {', '.join(other_names)};"
+            " give two rigs with the same names, or two cameras"
         )
     return {name: (one / name, other / name) for name in names}
 

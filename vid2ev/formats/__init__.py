@@ -303,7 +303,9 @@ def _within(folder: Path) -> Path:
     bag = folder / "metadata.yaml"
     cameras = _cameras(folder)
     if cameras and not bag.exists():
-        names, seen = ", ".join(camera.name for camera in cameras), event_cameras(folder) or cameras[:1]
+        names, seen = ", ".join(camera.name for camera in cameras), event_cameras(folder)
+        if not seen:
+            raise UsageError(f"{folder} holds frames of {names} and no events; give a recording of an event camera")
         raise UsageError(f"{folder} is a recording of the cameras {names}; give one: {' or '.join(map(str, seen))}")
     if (folder / "timestamps.txt").exists() or any((folder / name).exists() for name in ("raw", "frames.mp4")):
         raise UsageError(f"{folder} holds frames and no events; give the folder of an event camera")
