@@ -57,6 +57,7 @@ def test_extremes_and_times_are_those_of_all_pixels() -> None:
         assert scene.slope_max[tile] == pytest.approx(steepest[part].max(), rel=1e-4)
     assert scene.seconds == pytest.approx(t_s[-1] - t_s[0]) and scene.frames == len(frames)
     assert scene.shortest_s == pytest.approx(np.diff(t_s).min()) and np.diff(t_s)[-1] > 1.5 * scene.shortest_s
+    assert scene.longest_interval_s == pytest.approx(np.diff(t_s).max())
     assert scene.pushed_s.sum() <= scene.seconds * scene.pixels
 
 

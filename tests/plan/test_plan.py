@@ -372,6 +372,31 @@ def test_of_light_that_crosses_more_levels_at_once_than_are_solved_nothing_is_su
             assert row.omission.sure == (changed <= row.omission.distance) == (cap == 4096)
 
 
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("apart_ms", [10, 1000])
+def test_of_a_leak_that_crosses_more_levels_at_once_than_are_solved_nothing_is_sure(apart_ms: int, moves: bool) -> None:
+    """In the longest interval, whatever the light does; 40 levels are crossed in a second."""
+    size = (4, 3)
+    lights = [np.full(size[::-1], 0.3 * (1 + 0.9 * moves * math.sin(k)), np.float32) for k in range(4)]
+    frames = [Frame(light, k * apart_ms * 1_000_000) for k, light in enumerate(lights)]
+    spec = clean(leak_rate_hz=40.0, random_phase=True, shot_rate_hz=0.1, max_crossings=39)
+    plan = plan_of(scene_of(spec, size, frames), spec, 1.0)
+    capped = apart_ms == 1000
+    assert all(("max_crossings = 39" in row.omission.why) == capped != row.omission.sure for row in plan.rows)
+
+
+@pytest.mark.parametrize("hz", [20.0, 2000.0])
+def test_of_a_leak_whose_events_are_near_each_other_nothing_is_sure(hz: float) -> None:
+    """2000 a second by themselves are coth(1/4) = 4.1 from none, four times what nothing in common counts."""
+    size, frames = (4, 3), [Frame(np.full((3, 4), 0.3, np.float32), k * 100_000_000) for k in range(11)]
+    spec = clean(leak_rate_hz=hz, random_phase=True)
+    plan, said = plan_of(scene_of(spec, size, frames), spec, 1.0), EFFECTS["leak"]
+    changed = distance(sent(spec, size, frames), sent(spec.model_copy(update=said.off), size, frames), size)
+    (row,) = plan.rows
+    assert row.omission.sure == (changed <= row.omission.distance * (1 + 1e-3)) == (hz == 20.0)
+    assert plan.gone == (("leak",) if hz == 20.0 else ()) and ("near each other" in str(plan)) == (hz != 20.0)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("share", [0.6, 3.0])
 def test_pixels_of_low_thresholds_send_more_densely(share: float) -> None:

@@ -136,6 +136,7 @@ class Scene:
 
     size, frames, seconds     width and height, and how much was measured; seconds without the intervals before cuts
     shortest_s, longest_s     the shortest of the intervals, infinite without any; and the longest shot
+    longest_interval_s        the longest of the intervals, 0 without any
     threshold                 that events are counted with [nat]: the lesser mean
     light_min, light_max      [tiles] of the light that arrives
     slope_max                 [tiles] greatest |dy/dt| of y = ln(light + dark) [nat/s]
@@ -175,6 +176,7 @@ class Scene:
     seconds: float
     shortest_s: float
     longest_s: float
+    longest_interval_s: float
     threshold: float
     light_min: np.ndarray
     light_max: np.ndarray

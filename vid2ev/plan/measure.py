@@ -76,7 +76,7 @@ class Measure:
         self._by_light = spec.bandwidth == "light" and self._tau1_s > 0
         self._blind_s = spec.refractory_us * 1e-6 if tracks(spec) else 0.0
         self._frames, self._ns, self._shortest_ns = 0, 0, math.inf
-        self._shot_ns, self._longest_ns = 0, 0
+        self._shot_ns, self._longest_ns, self._longest_interval_ns = 0, 0, 0
         self._when = np.zeros((blocks, len(TIMED)))  # sums of figures times the time since the shot began [s]
         self._t_ns: int | None = None
         self._dt_s = math.inf
@@ -100,12 +100,14 @@ class Measure:
             self._dt_s, self._pace, self._shot_ns = math.inf, None, 0
         else:
             before = self._found.tiles[:, TIMED]
-            self._advance(light, told_of([frame.still], [self._last])[0], (frame.t_ns - self._t_ns) * 1e-9)
-            self._ns += frame.t_ns - self._t_ns
-            self._shot_ns += frame.t_ns - self._t_ns
+            dt_ns = frame.t_ns - self._t_ns
+            self._advance(light, told_of([frame.still], [self._last])[0], dt_ns * 1e-9)
+            self._ns += dt_ns
+            self._shot_ns += dt_ns
             self._longest_ns = max(self._longest_ns, self._shot_ns)
             self._when += self._timed(self._found.tiles, before)
-            self._shortest_ns = min(self._shortest_ns, frame.t_ns - self._t_ns)
+            self._shortest_ns = min(self._shortest_ns, dt_ns)
+            self._longest_interval_ns = max(self._longest_interval_ns, dt_ns)
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
         self._frames, self._t_ns, self._last = self._frames + 1, frame.t_ns, frame.light
@@ -121,6 +123,7 @@ class Measure:
             seconds=self._ns * 1e-9,
             shortest_s=self._shortest_ns * 1e-9,
             longest_s=self._longest_ns * 1e-9,
+            longest_interval_s=self._longest_interval_ns * 1e-9,
             **dict(zip(("travelled_when_s", "pushed_when_s", "turned_when_s"), when_s, strict=True)),
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),

@@ -8,7 +8,8 @@ distance is a metric, bounds b_1, b_2, ... are together
 
 Estimates leave out nothing, and what costs nothing stays.  Of pixels whose memory jumps to the signal after each
 event (`refractory = "track"`) nearly all are estimates, so of these sensors hardly anything is left out; and all are
-where light may cross more levels at once than `max_crossings`, as bounds count all that are crossed.  Of pixels
+where light and leak may cross more levels at once than `max_crossings`, as bounds count all that are crossed, and where
+leak alone sends events within the time constant of the distance, as bounds take these to be by themselves.  Of pixels
 that start in step with thresholds that are all the same, a bound says only how far apart recordings with nothing in
 common are.
 Effects are tried in the order of their bounds; the second pole before both.
@@ -24,7 +25,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 from vid2ev.bounds.distance import together
-from vid2ev.bounds.scene import Omission, Scene
+from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.errors import UsageError, nearest
 from vid2ev.physics import (
     bad_pixels,
@@ -46,6 +47,7 @@ from vid2ev.sensors.record import changed
 from vid2ev.sensors.spec import DvsSpec
 
 TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
+NEAR_S = 10 * DISTANCE_TAU_S  # events of a pixel so far apart add up to 1.0001 times what each counts by itself
 FEW = 50  # events: their number is what it is said to be to a seventh, the standard deviation
 WORDS = ("auto", "all", "none")
 TOO_STEEP = "light jumps by more, and faster, than is measured"
@@ -185,10 +187,16 @@ def plan_of(
 
 def _said(omission: Omission, scene: Scene, spec: DvsSpec) -> Omission:
     """What an omission is said to change: where thresholds differ and light changes, but hardly any event is expected,
-    that is no bound, for the few are those of pixels whose thresholds happen to be low; nor is it where light may cross
-    more levels at once than are solved one by one, for what bounds count is what is crossed."""
-    if omission.sure and not scene.still and float(farthest(scene, spec).max()) >= spec.max_crossings * least(spec):
+    that is no bound, for the few are those of pixels whose thresholds happen to be low; nor is it where light and leak
+    may cross more levels at once than are solved one by one, for what bounds count is what is crossed, nor where events
+    of the leak come so soon after each other that a distance counts them together."""
+    leaked_nat_s = spec.leak_rate_hz * spec.threshold_on
+    way_nat = (0.0 if scene.still else float(farthest(scene, spec).max())) + leaked_nat_s * scene.longest_interval_s
+    if omission.sure and way_nat >= spec.max_crossings * least(spec):
         why = f"{omission.why}; with max_crossings = {spec.max_crossings} some of it may not be sent"
+        return replace(omission, kind="estimate", why=why)
+    if omission.sure and leaked_nat_s * NEAR_S > least(spec):
+        why = f"{omission.why}; at leak_rate_hz = {spec.leak_rate_hz:g} events of the leak are near each other"
         return replace(omission, kind="estimate", why=why)
     few = scene.events < FEW and scene.slope_max.any() and spread_of(spec) > 0
     return replace(omission, kind="estimate") if few and omission.kind == "99.9 % bound" else omission
