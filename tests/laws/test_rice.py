@@ -87,6 +87,17 @@ def test_noise_that_frames_are_too_few_for_sends_as_much_as_the_noise_itself(eve
     assert sent == pytest.approx(followed(300, tau2_us, sigma, 0.2, step_us, steps, 2000), rel=0.06)
 
 
+@pytest.mark.parametrize("kind", ["quantised", "track"])
+@pytest.mark.parametrize("refractory_us", [1, 1000])
+def test_of_noise_that_frames_are_too_few_for_a_blind_pixel_sends_what_leaves_its_level(refractory_us, kind):
+    """What it sends of the way back is nothing, however soon it sees again."""
+    noise = dict(threshold_on=0.2, threshold_off=0.2, photoreceptor_noise=0.2 / 3, photoreceptor_tau_us=300,
+                 follower_tau_us=100)  # fmt: skip
+    free = at_rest(clean(**noise), 0.4, 1_000_000, (64, 64))
+    blind = at_rest(clean(**noise, refractory=kind, refractory_us=refractory_us), 0.4, 1_000_000, (64, 64))
+    assert len(blind) / sum(excursions(free, (64, 64))) == pytest.approx(1, abs=0.03)
+
+
 def test_noise_goes_by_the_thresholds_that_a_shot_has_drawn():
     """Within an interval, too: other thresholds are passed at another rate from there on."""
     spec = clean(threshold_on=0.2, threshold_off=0.2, crossing_noise=0.06, photoreceptor_noise=0.05,
