@@ -22,22 +22,29 @@ HDR = ("hdr-small", "hdr-tiny")
 def path_of(weights: str | Path) -> Path:
     """A file of weights: itself, that of a run's folder, or by its name, with _ or -, one that comes with this version.
 
-    Raises UsageError where there is no such file, DataError for a pipe or a device.
+    Raises UsageError where there is no such file, or none yet of a run, DataError for a pipe or a device.
     """
     from vid2ev.untrusted import check_file
 
-    path = Path(str(weights))
-    if os.path.isdir(path):  # (Path.is_dir and Path.exists raise OSError for a name that is too long)
+    folder = path = Path(str(weights))
+    is_folder = os.path.isdir(path)  # (Path.is_dir and Path.exists raise OSError for a name that is too long)
+    if is_folder:
         path = path / OF_RUN
     if os.path.exists(path):
         check_file(path)
         return path
+    if is_folder and (folder / "run.json").exists():  # (one may be called like weights that come with this version)
+        raise UsageError(
+            f"weights {weights}: a run without {OF_RUN}, which is there from its first validation on; go on with it"
+            " (--resume), or name other weights"
+        )
     here = {file.stem: file for file in sorted(HERE.glob("*.safetensors"))}
     asked = str(weights).replace("-", "_")
     found = next((file for name, file in here.items() if name.replace("-", "_") == asked), None)
     if found is None:
+        what = f"a folder without {OF_RUN}" if is_folder else "no such file"
         raise UsageError(
-            f"weights {weights}: no such file, and none of those that come with vid2ev"
+            f"weights {weights}: {what}, and none of those that come with vid2ev"
             f"{nearest(str(weights), here)}: {', '.join(here)}"
         )
     return found

@@ -104,6 +104,25 @@ def test_weights_are_a_file_or_a_run_or_come_by_their_name(tmp_path: Path) -> No
         pretrained.path_of("longer than files can be called " * 999)
 
 
+@pytest.mark.parametrize("name", [COME[0].stem, COME[0].stem.replace("-", "_"), "run"])
+def test_a_run_without_weights_is_not_taken_for_those_that_come_with_vid2ev(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run is called NETWORK_SIZE unless it is said otherwise, as those are."""
+    monkeypatch.chdir(tmp_path)
+    Path(name).mkdir()
+    if name == "run":
+        with pytest.raises(UsageError, match=r"run: a folder without weights\.safetensors, and none of"):
+            pretrained.path_of(name)
+    else:  # (of nobody's training)
+        assert pretrained.path_of(name) == COME[0]
+    Path(name, "run.json").touch()
+    with pytest.raises(UsageError, match=rf"{name}: a run without weights\.safetensors.*--resume"):
+        pretrained.path_of(name)
+    Path(name, pretrained.OF_RUN).touch()
+    assert pretrained.path_of(name) == Path(name, pretrained.OF_RUN)
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there are no pipes that have names")
 def test_weights_from_a_pipe_are_not_waited_for(tmp_path: Path) -> None:
     """As in `--network <(curl ...)`: they are read more than once, and not from front to back."""
