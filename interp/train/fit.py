@@ -229,7 +229,7 @@ def made_by_workers() -> Iterator[None]:
 
 @contextmanager
 def unmentioned() -> Iterator[None]:
-    """Without what Lightning tells people who write training loops."""
+    """Without what Lightning and torch tell people who write training loops."""
     from lightning.fabric.utilities.warnings import PossibleUserWarning
 
     loggers = [logging.getLogger(f"lightning.{part}") for part in ("pytorch", "fabric")]
@@ -240,6 +240,7 @@ def unmentioned() -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PossibleUserWarning)
             warnings.filterwarnings("ignore", r".*isinstance\(treespec, LeafSpec\)", FutureWarning)
+            warnings.filterwarnings("ignore", r"This DataLoader will create \d+ worker processes", UserWarning)
             yield
     finally:
         for logger, level in zip(loggers, levels, strict=True):

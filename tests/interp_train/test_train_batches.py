@@ -8,7 +8,7 @@ import pytest
 from torch.utils.data import DataLoader, Dataset
 
 from interp.train.batches import Steps
-from interp.train.fit import made_by_workers
+from interp.train.fit import made_by_workers, unmentioned
 from vid2ev.errors import DataError, DiskError, UsageError
 
 
@@ -44,3 +44,10 @@ def test_what_makes_samples_says_one_sentence_whichever_process_it_is(kind: type
     with pytest.raises(kind) as error, made_by_workers():
         list(DataLoader(Unmade(kind(said)), num_workers=workers))
     assert type(error.value) is kind and str(error.value) == said
+
+
+@pytest.mark.parametrize("workers", [1, 2, 1000])
+def test_more_workers_than_cores_are_nothing_that_torch_warns_of(workers: int) -> None:
+    """Who asks for them has said so, and `--quiet` means errors only.  (A warning fails a test.)"""
+    with unmentioned():
+        DataLoader(Unmade(UsageError("never asked for")), num_workers=workers)
