@@ -8,7 +8,8 @@
 
 Of the last two, that which has pictures of frames that are scored alone; where both or neither have, the first.
 Numbers without a gap are counted; those with gaps are of frames, unless they are those of the rebuilt frames by their
-own count.  Where a count from 0 may be either, nobody can tell.
+own count, or as many as these, and of frames that are scored alone if 1 is the first.  Where a count from 0 may be
+either, nobody can tell.
 """
 
 from __future__ import annotations
@@ -126,10 +127,14 @@ def paired(
             return Paired(files_of, f"{len(files)} pictures {found.said}" if found.said else "")
     if its_own := _of_own(files, gaps, numbers, own):
         return its_own
+    from_1 = _only_from_1(gaps, numbers)
+    if from_1 and len(files) in (len(gaps.within(gaps.rebuilt, count)) for count in (gaps.every, gaps.asked)):
+        named = {number - 1: path for number, path in zip(numbers.of, files, strict=True)}
+        return Paired(named, f"{len(files)} pictures for {frames} frames {_by_number(numbers, 1)}")
     if not _of_frames(gaps, numbers):
         raise _unknown(files, gaps, numbers)
     plain = protocol.insert == protocol.skip and not numbers.counted_from(0) and max(numbers.of) < frames
-    plain &= not own or [*own] == [*range(frames)]
+    plain &= not from_1 and (not own or [*own] == [*range(frames)])
     remark = "" if plain else f"{len(files)} pictures for {frames} frames {_by_number(numbers)}"
     return Paired(dict(zip(numbers.of, files, strict=True)), remark)
 
@@ -196,6 +201,13 @@ def _of_own(files: Sequence[Path], gaps: Gaps, numbers: Numbers, own: Sequence[i
     return Paired(dict(zip(named, files, strict=True)), said)
 
 
+def _only_from_1(gaps: Gaps, numbers: Numbers) -> bool:
+    """Whether numbers with gaps are all of frames that are scored if 1 is that of the first, and not if it is 0."""
+    scored = {*gaps.within([*gaps.protocol.positions], gaps.every)}
+    named = {number - 1 for number in numbers.of}
+    return not numbers.gapless and named <= scored and not {*numbers.of} <= scored
+
+
 def _own_count(gaps: Gaps, count: int) -> list[int]:
     """The numbers of rebuilt frames of some gaps in a count of their own, in which key frames are counted, too."""
     whole = gaps.protocol.insert + 1
@@ -207,8 +219,9 @@ def _limited(gaps: Gaps, count: int) -> str:
     return f"are taken for those rebuilt in {_of(count)}" if gaps.asked < gaps.every else ""
 
 
-def _by_number(numbers: Numbers) -> str:
-    return f"are taken for the frames of the numbers that their names end in, {_ends(numbers)}, 0 for the first frame"
+def _by_number(numbers: Numbers, first: int = 0) -> str:
+    ends = _ends(numbers)
+    return f"are taken for the frames of the numbers that their names end in, {ends}, {first} for the first frame"
 
 
 def _ends(numbers: Numbers) -> str:

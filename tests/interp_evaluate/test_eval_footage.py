@@ -578,6 +578,27 @@ def test_of_predictions_of_which_some_are_missing_it_is_said_whose_numbers_they_
         assert found.files == files or found.remark
 
 
+@pytest.mark.parametrize(("skip", "gaps", "rest"), [(1, 5, 0), (1, 6, 1), (3, 4, 0), (7, 2, 2), (7, 5, 0), (4, 3, 3)])
+def test_predictions_that_are_numbered_from_1_are_of_no_other_frames(skip: int, gaps: int, rest: int) -> None:
+    """As FFmpeg numbers the pictures that it takes out of a film: those rebuilt are called as it calls their truth."""
+    frames, protocol, draw = gaps * (skip + 1) + 1 + rest, Protocol(skip, skip), np.random.default_rng(0)
+    scored = [k for k in range(gaps * (skip + 1)) if k % (skip + 1)]
+    files = {k: Path(f"{k + 1:06d}.png") for k in scored}
+    for own in ((), range(frames), range(1, frames + 1)):
+        assert paired([*files.values()], frames, protocol, own=own).files == files
+        for lost in draw.choice(scored, 4, replace=False).tolist():
+            some = {k: path for k, path in files.items() if k != lost}
+            found = paired([*some.values()], frames, protocol, own=own)
+            assert found.files == some or found.remark
+    for limit in range(1, gaps):
+        few = {k: path for k, path in files.items() if k < limit * (skip + 1)}
+        if limit == 1:  # (without a gap in their numbers)
+            with pytest.raises(DataError, match=f"{skip} pictures for {frames} frames"):
+                paired([*few.values()], frames, protocol, limit=limit)
+        else:
+            assert paired([*few.values()], frames, protocol, limit=limit).files == few
+
+
 def test_predictions_of_folders_that_are_numbered_otherwise_are_compared_with_what_they_are_called_as(
     tmp_path: Path,
 ) -> None:
