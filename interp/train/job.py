@@ -36,7 +36,7 @@ class Window(BaseModel):
 
     begin: int = Field(256, ge=1, description="clips that there are before the first sample")
     most: int = Field(1500, ge=1, description="clips at any time; each of 128x128 pixels takes 2.6 MB of disk")
-    fresh: float = Field(0.02, ge=0, description="clips that join with each sample")
+    fresh: float = Field(0.02, ge=0, le=1e6, description="clips that join with each sample")
 
     @model_validator(mode="after")
     def _fits(self) -> Window:

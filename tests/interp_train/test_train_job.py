@@ -61,6 +61,7 @@ def test_settings_reach_what_they_are_of() -> None:
         ("rrin", ["samples.size=3"], r"setting samples.size = 3 is impossible: it must be greater than or equal to 16"),
         ("rrin", ["window.begin=0"], r"setting window.begin = 0 is impossible"),
         ("rrin", ["window.fresh=inf"], r"setting window.fresh = inf is impossible"),
+        ("rrin", ["window.fresh=1e307"], r"window.fresh = 1e\+307 is impossible: it must be less than or equal to"),
         ("rrin", ["network.depths=[5, 4]"], r"depths = \[5, 4\] is impossible: it has too few values"),
         ("rrin", ["clips.motion=[[1, 2]]"], r"clips.motion.0.2 = \[1, 2\] is impossible: it has too few values"),
         ("rrin", ["threads=3000000000"], r"threads = 3000000000 is impossible: it must be less than or equal to 1024"),
