@@ -7,6 +7,7 @@ import ctypes
 import json
 import logging
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -309,6 +310,15 @@ def test_warnings_of_a_rig_say_which_cameras_they_are_about() -> None:
     results = {name: {"counts": counts, "duration_us": 1, "warnings": texts} for name, texts in said.items()}
     facts = result_facts({"results": results, "cameras": {name: {"size": [1, 1]} for name in said}})
     assert [text for name, text in facts if name == "warning"] == ["left: a", "b", "left, right: c"]
+
+
+def test_one_of_anything_is_not_said_as_of_several() -> None:
+    light = np.array([[[0.1, 0]], [[0.13, np.nan]]], np.float32)
+    np.save("light.npy", light)
+    options = ["--fps", "100", "--sensor", "ideal", "--set", "threshold_on=0.2", *QUICK]
+    said = vid2ev("convert", "light.npy", *options).output
+    assert re.search(r"^events +1,", said) and "1 value of light" in said and "1 sensor thread" in said, said
+    assert not re.search(r"\b1 (?![mu]?s\b)[a-z]+s\b", said), said
 
 
 def test_a_truncated_video_is_converted_with_a_warning() -> None:

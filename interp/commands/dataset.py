@@ -105,11 +105,12 @@ def dataset(
 def _said(outcome: Outcome) -> Said:
     """What is said of a scene that is made or left out."""
     from vid2ev.commands.live import Said, said_of
+    from vid2ev.terminal import counted
 
     made = outcome.value
     if outcome.error or made.failed:
         return Said(f"{outcome.name}: left out: {made.failed}", failed=True) if made else said_of(outcome)
-    return Said(f"{outcome.name}: {made.facts['events']:,} events", made.facts["events"])
+    return Said(f"{outcome.name}: {counted(made.facts['events'], 'event')}", made.facts["events"])
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -213,7 +213,7 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
         facts.append(("tiles", made["tiles"]))
     for reason, gaps in made["gaps_s"].items():
         first = f", the first at {gaps[0][0]:.6g} s"
-        many = f"{len(gaps)} gap{'s' * (len(gaps) > 1)}"
+        many = counted(len(gaps), "gap")
         facts.append(("held", f"{many} not interpolated as asked, because of {reason}{first}"))
     run = made["run"]
     facts.append(("speed", f"{run['frames'] / max(run['seconds'], 1e-9):.3g} frames/s, {run['seconds']:.3g} s"))

@@ -35,6 +35,7 @@ from vid2ev.cost.front import ahead
 from vid2ev.cost.turns import Report, Turns
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine
+from vid2ev.terminal import counted
 
 Size = tuple[int, int]
 GAPS = 4
@@ -149,14 +150,15 @@ def rebuilding(
     Raises UsageError for what cannot be meant, DataError for what cannot be read.
     """
     if multiple < 2 or gaps < 1 or repeats < 1:
-        raise UsageError(f"{multiple} times the frames, {gaps} gaps, {repeats} repeats: expected at least 2, 1 and 1")
+        asked = f"{counted(multiple, 'time')} the frames, {counted(gaps, 'gap')}, {counted(repeats, 'repeat')}"
+        raise UsageError(f"{asked}: expected at least 2, 1 and 1")
     protocol = Protocol(multiple - 1, multiple - 1)
     several = footage_of([source], protocol, simulated or Simulated.of("clean"), gaps).footage
     footage = several[0]
     check_simulated([footage], simulated)
     groups = list(footage.groups())
     if not groups:
-        raise UsageError(f"{source}: no two key frames with {multiple - 1} frames between them; give a longer one")
+        raise UsageError(f"{source}: no two key frames {counted(multiple, 'frame')} apart; give a longer one")
     if not any(range_of(true) for group in groups for true in group.truth):
         raise DataError(f"{source}: each frame to be rebuilt is of one value all over; give one of things")
     tried = ways(networks, device)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from vid2ev.sources import SYNTHETIC_PREFIX, is_scene
+from vid2ev.terminal import counted
 
 KNOWN = """\
 * Frames of the truth are the light of an instant, without exposure and noise.{exposures}
@@ -71,4 +72,4 @@ def _used(facts: dict[str, Any]) -> str:
     """How many of the videos that were given there are scenes of, by the beginnings of their names."""
     given = len(facts["spec"]["videos"])
     used = len({name.rpartition("-")[0] for name in facts["of_scenes"]})
-    return f"{given} video{'s' * (given != 1)}" if used == given else f"{used} of {given} videos"
+    return f"{counted(given, 'video')}" if used == given else f"{used} of {given} videos"

@@ -27,6 +27,7 @@ from vid2ev.scenes.scene_file import scene_names
 from vid2ev.sources import begins_s, is_single_picture
 from vid2ev.sources.cut import FASTEST, SLOWEST
 from vid2ev.sources.source import LARGEST
+from vid2ev.terminal import counted
 
 Side = Annotated[int, Field(ge=1, le=LARGEST)]
 Layout = Literal["own", "hsergb", "bsergb"]
@@ -109,7 +110,8 @@ def _rendered(spec: DatasetSpec, number: int) -> Scene:
     length_s = (spec.frames - 1) / spec.cis_fps + exposure_s + EDGES_S
     duration_s = read_scene(name).resolved(seed).scene.duration_s
     if length_s > duration_s:
-        raise UsageError(f"{spec.frames} frames at {spec.cis_fps:g} Hz: the scene {name} is too short; ask for fewer")
+        asked = f"{counted(spec.frames, 'frame')} at {spec.cis_fps:g} Hz"
+        raise UsageError(f"{asked}: the scene {name} is too short; ask for fewer")
     start_s = round(uniform(draw, (0.0, duration_s - length_s)), 6)
     options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9), "seed": int(draw.integers(1 << 62))}
     return Scene(f"{name}-{number:05d}", f"scene:{name},seed={seed},size={spec.size[0]}x{spec.size[1]}", options)
@@ -142,8 +144,8 @@ def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
     if seconds < length_s:
         slower = f", or a smaller --slowdown than {spec.slowdown:g}" * (spec.slowdown > 1)
         raise UsageError(
-            f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {spec.frames} frames; give a longer"
-            f" video{slower}, or leave this one out"
+            f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {counted(spec.frames, 'frame')}; give a"
+            f" longer video{slower}, or leave this one out"
         )
     begin_s = begins_s(source)  # (of films cut out of others it is not 0, and start and stop are by their clock)
     for part in range(math.floor(seconds / length_s)):

@@ -17,6 +17,7 @@ from interp.data.simulate import kept_counts
 from interp.own_codes import in_srgb
 from interp.representation.carried import over
 from vid2ev.errors import DataError, UsageError
+from vid2ev.terminal import counted
 
 MOST_OPENED = 512  # sequences, each of whose event files are looked through as it is opened; 8 bytes per pixel and less
 
@@ -133,8 +134,8 @@ def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.nd
     window = windows(sequence, multiple, even=True)
     if len(window.first) and isinstance(sequence, Own):
         return _between_pictures(sequence, window.first, multiple)
-    reasons = [f"{count} windows: {reason}" for reason, count in window.unusable.items()]
-    too_few = f"{len(sequence.times_us)} frames, expected {multiple + 1} or more"
+    reasons = [f"{counted(count, 'window')}: {reason}" for reason, count in window.unusable.items()]
+    too_few = f"{counted(len(sequence.times_us), 'frame')}, expected {multiple + 1} or more"
     return window.first, "" if len(window.first) else f"{path}: {', '.join(reasons) or too_few}"
 
 

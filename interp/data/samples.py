@@ -18,6 +18,7 @@ from interp.data.recorded import coarser_by
 from interp.data.settings import ClipSettings
 from interp.data.tensors import Sample, as_tensor, tensors
 from vid2ev.errors import UsageError
+from vid2ev.terminal import counted
 
 
 class SampleSettings(BaseModel):
@@ -121,8 +122,8 @@ def check_targets(clips: ClipSettings, targets: int) -> None:
     """Raise UsageError unless there are so many frames between the key frames of all clips."""
     if targets >= min(clips.multiples):
         raise UsageError(
-            f"{targets} targets of clips with {min(clips.multiples) - 1} frames in between: expected no more; give"
-            " --set samples.targets=N"
+            f"{counted(targets, 'target')} of clips with {counted(min(clips.multiples) - 1, 'frame')} in between:"
+            " expected no more; give --set samples.targets=N"
         )
 
 

@@ -23,6 +23,7 @@ from vid2ev.sensors.devices import Device
 from vid2ev.sources import Source, begins_s, is_single_picture
 from vid2ev.stamps import Stamp, stamp
 from vid2ev.stream.frames import Colour
+from vid2ev.terminal import counted
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
 
@@ -150,7 +151,7 @@ def _fitting(source: Source, name: str, size: tuple[int, int], multiple: int) ->
     count, seconds = length_of(source, name)
     least = _wanted(multiple) + 1
     if not seconds or count < least:
-        raise UsageError(f"{name}: {count} frames; expected at least {least} for clips of {multiple}")
+        raise UsageError(f"{name}: {counted(count, 'frame')}; expected at least {least} for clips of {multiple}")
     fits = [each for each in SMALLER if all(each * want <= have for want, have in zip(size, source.size, strict=True))]
     if not fits:
         raise UsageError(
@@ -176,7 +177,8 @@ def _drawn(
         frames = _read(source, start_s, count, part, size)
         if len(frames) == count:
             return start_s, frames
-    raise UsageError(f"{name}: {len(frames)} frames after {start_s:.3f} s, expected {count}; give a longer film")
+    found = counted(len(frames), "frame")
+    raise UsageError(f"{name}: {found} after {start_s:.3f} s, expected {count}; give a longer film")
 
 
 def _read(

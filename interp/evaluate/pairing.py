@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from interp.evaluate.protocol import Protocol
 from vid2ev.errors import DataError
+from vid2ev.terminal import counted
 
 Frames = tuple[int | None, ...]  # that pictures are of, in order; None where there is no frame of the truth
 
@@ -124,18 +125,19 @@ def paired(
             raise _unknown(files, gaps, numbers)
         for found in fitting.values():
             files_of = {frame: path for frame, path in zip(found.frames, files, strict=True) if frame is not None}
-            return Paired(files_of, f"{len(files)} pictures {found.said}" if found.said else "")
+            return Paired(files_of, f"{counted(len(files), 'picture')}, {found.said}" if found.said else "")
     if its_own := _of_own(files, gaps, numbers, own):
         return its_own
+    many = f"{counted(len(files), 'picture')} for {counted(frames, 'frame')}"
     from_1 = _only_from_1(gaps, numbers)
     if from_1 and len(files) in (len(gaps.within(gaps.rebuilt, count)) for count in (gaps.every, gaps.asked)):
         named = {number - 1: path for number, path in zip(numbers.of, files, strict=True)}
-        return Paired(named, f"{len(files)} pictures for {frames} frames {_by_number(numbers, 1)}")
+        return Paired(named, f"{many}, {_by_number(numbers, 1)}")
     if not _of_frames(gaps, numbers):
         raise _unknown(files, gaps, numbers)
     plain = protocol.insert == protocol.skip and not numbers.counted_from(0) and max(numbers.of) < frames
     plain &= not from_1 and (not own or [*own] == [*range(frames)])
-    remark = "" if plain else f"{len(files)} pictures for {frames} frames {_by_number(numbers)}"
+    remark = "" if plain else f"{many}, {_by_number(numbers)}"
     return Paired(dict(zip(numbers.of, files, strict=True)), remark)
 
 
@@ -157,7 +159,7 @@ def _likely(gaps: Gaps, numbers: Numbers) -> Iterator[Reading]:
     for count in dict.fromkeys((gaps.every, gaps.asked)):
         for places, what in ((gaps.skipped, "are skipped"), ([*gaps.protocol.positions], "are scored")):
             if places != gaps.rebuilt:
-                yield Reading(gaps.within(places, count), f"are taken for the frames that {what} in {_of(count)}")
+                yield Reading(gaps.within(places, count), f"taken for the frames that {what} in {_of(count)}")
 
 
 def _with_keys(gaps: Gaps, numbers: Numbers) -> Iterator[Reading]:
@@ -167,7 +169,7 @@ def _with_keys(gaps: Gaps, numbers: Numbers) -> Iterator[Reading]:
     for count in dict.fromkeys((gaps.every, gaps.asked)):
         for places, what in ((gaps.skipped, "skipped"), (gaps.rebuilt, "rebuilt")):
             found = gaps.within(places, count, keys=True)
-            yield Reading(found, f"are taken for the frames {what} in {_of(count)}, and the key frames around them")
+            yield Reading(found, f"taken for the frames {what} in {_of(count)}, and the key frames around them")
             if len(found) == len(numbers.of) < gaps.frames:
                 yield Reading((*range(len(found)),), _by_number(numbers))
 
@@ -197,7 +199,8 @@ def _of_own(files: Sequence[Path], gaps: Gaps, numbers: Numbers, own: Sequence[i
     scored = {*gaps.within([*gaps.protocol.positions], gaps.every)}
     if {*numbers.of} <= scored or not {*named} <= scored:
         return None
-    said = f"{len(files)} pictures are taken for the frames whose own pictures have the same numbers, {_ends(numbers)}"
+    taken = f"taken for the frames whose own pictures have the same numbers, {_ends(numbers)}"
+    said = f"{counted(len(files), 'picture')}, {taken}"
     return Paired(dict(zip(named, files, strict=True)), said)
 
 
@@ -216,12 +219,12 @@ def _own_count(gaps: Gaps, count: int) -> list[int]:
 
 def _limited(gaps: Gaps, count: int) -> str:
     """That a limit makes it less plain which gaps pictures are of."""
-    return f"are taken for those rebuilt in {_of(count)}" if gaps.asked < gaps.every else ""
+    return f"taken for those rebuilt in {_of(count)}" if gaps.asked < gaps.every else ""
 
 
 def _by_number(numbers: Numbers, first: int = 0) -> str:
     ends = _ends(numbers)
-    return f"are taken for the frames of the numbers that their names end in, {ends}, {first} for the first frame"
+    return f"taken for the frames of the numbers that their names end in, {ends}, {first} for the first frame"
 
 
 def _ends(numbers: Numbers) -> str:
@@ -236,6 +239,7 @@ def _unknown(files: Sequence[Path], gaps: Gaps, numbers: Numbers) -> DataError:
     rebuilt = gaps.protocol.insert * gaps.asked
     either = "; without a gap in their numbers these may be counted: leave out key frames" if numbers.gapless else ""
     return DataError(
-        f"{files[0].parent}: {len(files)} pictures for {gaps.frames} frames, of which {rebuilt} are rebuilt; expected"
-        f" as many as either, or names that end in the number of the frame, from 0{either}"
+        f"{files[0].parent}: {counted(len(files), 'picture')} for {counted(gaps.frames, 'frame')}, of which"
+        f" {rebuilt} are rebuilt; expected as many as either, or names that end in the number of the frame, from"
+        f" 0{either}"
     )

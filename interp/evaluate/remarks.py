@@ -51,8 +51,11 @@ def notes(summary: Mapping[str, Any]) -> list[str]:
 
 def not_scored(summary: Mapping[str, Any]) -> list[str]:
     """What was not scored, and how much of it."""
-    parts = [(count, reason.partition("s")) for reason, count in left_out(summary).items()]
-    return [f"{counted(count, thing)}{why}" for count, (thing, _, why) in parts]
+    said = []
+    for reason, count in left_out(summary).items():
+        thing = "gap" if reason.startswith("gaps") else "frame"
+        said.append(counted(count, thing) + reason.removeprefix(f"{thing}s"))
+    return said
 
 
 def several(names: Iterable[str]) -> str:

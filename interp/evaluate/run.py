@@ -40,6 +40,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.manifest import versions
 from vid2ev.requests import is_whole
+from vid2ev.terminal import counted
 
 SUMMARY = "summary.json"
 FEWEST = 3  # frames of which one can be rebuilt
@@ -142,7 +143,7 @@ def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
     if reasons := not_scored({"sequences": {name: about}}):
         return f"{name}: {', '.join(reasons)}"
     remedy = "give a smaller --skip" if about["frames"] >= FEWEST else "give more of it"
-    frames = f"{about['frames']} frame{'s' * (about['frames'] != 1)}"
+    frames = counted(about["frames"], "frame")
     return f"{name}: {frames}, expected {protocol.multiple + 1} or more; {remedy}"
 
 

@@ -33,6 +33,7 @@ from vid2ev.light.pictures import PictureReader
 from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.recording.exposures import LATEST_US
 from vid2ev.recording.manifest import identity
+from vid2ev.terminal import counted
 
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 COLUMNS = 4
@@ -67,7 +68,8 @@ class OfStill:
         self._codes = to_codes(torch.from_numpy(light)[..., : self.channels], "srgb").numpy()
         self._events, stated, warnings = (table_of(events), None, []) if is_mat(events) else _events_in(events)
         if len(self._events) < 2:
-            raise DataError(f"{events} holds {len(self._events)} events; expected those of the exposure of a frame")
+            held = counted(len(self._events), "event")
+            raise DataError(f"{events} holds {held}; expected those of the exposure of a frame")
         corner = int(self._events.x.max()) + 1, int(self._events.y.max()) + 1
         guess = self.size if all(np.less_equal(corner, self.size)) else corner
         self.event_size: tuple[int, int] = stated or guess

@@ -9,6 +9,7 @@ from typing import Literal, Self
 
 from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
+from vid2ev.terminal import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +44,8 @@ class Machines:
         """Raise UsageError where there are fewer clips to validate with than processes that do."""
         if count < self.devices * self.nodes:
             raise UsageError(
-                f"{count} clips to validate with among {self.devices * self.nodes} processes, expected one each at"
-                " least; set more validation.clips, or use fewer --devices"
+                f"{counted(count, 'clip')} to validate with among {self.devices * self.nodes} processes, expected one"
+                " each at least; set more validation.clips, or use fewer --devices"
             )
 
     def spare(self, threads: int) -> int:

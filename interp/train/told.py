@@ -10,7 +10,7 @@ from typing import Any
 from interp.train.fit import Outcome
 from interp.train.job import Job
 from interp.train.scores import Scores
-from vid2ev.terminal import lines
+from vid2ev.terminal import counted, lines
 
 COLUMNS = ("psnr", "ssim", "moving", "static")
 HEADS = ("PSNR", "SSIM", "moving", "static")
@@ -20,14 +20,14 @@ OF_HDR = ("PSNR", "SSIM", "above", "below")  # the range of the frames (`hdr.py`
 def described(job: Job, path: Path) -> str:
     """What a run will do."""
     recipe = job.recipe
-    length = f"{recipe.steps:,} steps" if recipe.steps else f"{recipe.time_s / 60:g} minutes"
+    length = counted(recipe.steps, "step") if recipe.steps else f"{recipe.time_s / 60:g} min"
     sources = {name: getattr(job.clips, name) for name in ("scenes", "photographs", "videos", "recordings")}
     data = ", ".join(f"{100 * share / sum(sources.values()):.0f} % {name}" for name, share in sources.items() if share)
     return lines(
         [
             ("network", f"{job.network}, {job.size}"),
             *([("begins with", _starts(job))] if job.starts else []),
-            ("training", f"{length} of {recipe.batch} samples of {job.samples.size}x{job.samples.size}"),
+            ("training", f"{length} of {counted(recipe.batch, 'sample')} of {job.samples.size}x{job.samples.size}"),
             ("data", f"{data}; x{', x'.join(map(str, job.clips.multiples))}"),
             ("run", str(path)),
         ]

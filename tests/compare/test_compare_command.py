@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,14 @@ def test_nothing_in_common_is_1_or_more_and_so_it_is_said() -> None:
         burst = write(events_of(np.repeat([1000, 500_000], at_once)), name, duration_us=10**6)
         assert compare(burst, nothing)["distance"] == pytest.approx(at_once)
         assert "1 or more: nothing in common" in CliRunner().invoke(command, [burst, nothing]).stdout
+
+
+def test_one_is_one_event_and_no_events() -> None:
+    one = write(events_of([1000]), "one.h5", duration_us=10**6)
+    other = write(events_of([1000, 999_999], p=[0, 1]), "other.h5", duration_us=10**6)
+    for pair in ((one, other), (other, one), (one, one)):
+        said = CliRunner().invoke(command, [*pair, "--statistics"], catch_exceptions=False).stdout
+        assert re.search(r"\b1 event\b", said) and not re.search(r"\b1 (?![mu]?s\b)[a-z]+s\b", said), said
 
 
 def test_what_both_have_is_compared() -> None:

@@ -83,6 +83,13 @@ def test_a_file_out_of_order_is_taken_with_a_warning(tmp_path: Path) -> None:
     assert recording.start_us == 0 and recording.duration_us == 20
 
 
+def test_one_place_is_no_places(tmp_path: Path) -> None:
+    (tmp_path / "events.csv").write_text("t,x,y,p\n5,0,0,1\n3,1,0,1\n9,0,0,1\n")
+    file = open_events(tmp_path / "events.csv")
+    survey(file)
+    assert file.warnings == ["times go back at 1 place, by at most 2 us: put in order"]
+
+
 def test_two_recordings_in_one_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "events.csv").write_text("t,x,y,p\n0,1,1,1\n100000000,1,1,0\n5,1,1,1\n")
     with pytest.raises(DataError, match="go back by 100 s"):

@@ -190,7 +190,7 @@ def test_frames_smaller_than_the_window_of_ssim_have_none(quick: None, tmp_path:
         (["--rebuild", "8", "--budget", "vR=1"], "--budget is of conversions"),
         (["--rebuild", "8", "--duration", "0.1"], "error: --duration is of conversions"),
         (["--rebuild", "8", "--network", "nobody"], "no such file"),
-        (["--rebuild", "1000"], "no two key frames with 999 frames between them"),
+        (["--rebuild", "1000"], "no two key frames 1,000 frames apart"),
     ],
 )
 def test_what_cannot_be_meant_is_one_sentence(options: list[str], said: str, tmp_path: Path) -> None:

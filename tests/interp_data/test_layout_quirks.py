@@ -180,7 +180,7 @@ def test_as_many_pictures_as_times_belong_together(tmp_path: Path, images: int, 
     written(tmp_path / "seq", images=images, times="".join(f"{STEP_US * (k + 1)}\n" for k in range(times)))
     sequence = open_sequence(tmp_path / "seq")
     assert len(sequence.times_us) == count
-    said = f"{images} picture{'s' * (images > 1)} and {times} times: the first {count} are taken for pairs"
+    said = f"{images} picture{'s' * (images > 1)} and {times} times: pairs are made of the first {count}"
     assert sequence.remarks[0] == said
 
 
@@ -189,7 +189,7 @@ def test_times_above_those_that_increase_are_of_no_picture(tmp_path: Path, head:
     written(tmp_path / "seq", times=head + "".join(f"{STEP_US * (k + 1)}\n" for k in range(6)))
     sequence = open_sequence(tmp_path / "seq")
     assert sequence.times_us.tolist() == [STEP_US * (k + 1) for k in range(6)]
-    assert any("times: the last 6 are taken for pairs" in remark for remark in sequence.remarks)
+    assert any("times: pairs are made of the last 6" in remark for remark in sequence.remarks)
 
 
 @pytest.mark.parametrize("layout", ["hsergb", "bsergb"])

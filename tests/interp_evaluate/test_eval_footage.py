@@ -615,7 +615,7 @@ def test_predictions_of_folders_that_are_numbered_otherwise_are_compared_with_wh
     options["simulated"] = Simulated.of("clean", fps=250)
     found = evaluate([str(tmp_path / "data"), str(tmp_path / "frames")], tmp_path / "report", **options)
     assert found.summary["methods"]["theirs"]["perfect"] == len(found.rows) == 18
-    said = "theirs: 9 pictures are taken for the frames whose own pictures have the same numbers, "
+    said = "theirs: 9 pictures, taken for the frames whose own pictures have the same numbers, "
     assert {f"seq: {said}1 to 12", f"frames: {said}2 to 12"} <= {*notes(found.summary)}
 
 
@@ -626,7 +626,7 @@ def test_where_pictures_were_paired_by_less_than_their_number_it_is_said(tmp_pat
     options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
     found = evaluate([str(tmp_path / "seq")], tmp_path / "report", limit=1, **options)
     assert found.summary["methods"]["theirs"]["perfect"] == 3
-    assert "seq: theirs: 3 pictures are taken for those rebuilt in the first gap" in notes(found.summary)
+    assert "seq: theirs: 3 pictures, taken for those rebuilt in the first gap" in notes(found.summary)
     again = evaluate([str(tmp_path / "seq")], tmp_path / "report", limit=1, resume=True, **options)
     assert again.summary == found.summary
 

@@ -112,7 +112,8 @@ def test_what_is_not_said_of_a_run_is_as_it_was_begun(said: list[str]) -> None:
 def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> None:
     told = run("--dry-run", "--time", "2h", "--network", "e2vid")
     assert told.exit_code == 0, told.output
-    assert "120 minutes of 8 samples of 96x96" in told.output and "e2vid_tiny" in told.output
+    assert "120 min of 8 samples of 96x96" in told.output and "e2vid_tiny" in told.output
+    assert "1 step of 1 sample of" in run("--dry-run", "--steps", "1", "--set", "batch=1", "--devices", "1").output
     job = json.loads(run("--dry-run", "--json", "--seed", "3").output)
     assert job["recipe"]["seed"] == 3
     assert not list(tmp_path.iterdir())
@@ -324,7 +325,7 @@ def test_who_makes_clips_ends_where_they_are_too_few_to_validate_with(
     ended: list[str] = []
     ahead: Any = SimpleNamespace(close=lambda: ended.append("clips"))
     monkeypatch.setattr(runs, "feed_of", lambda job, *_: Feed(Made(), clips(1), job.recipe.batch, 0, ahead))
-    with pytest.raises(UsageError, match="clips to validate with"):
+    with pytest.raises(UsageError, match="1 clip to validate with"):
         runs.run(Job.of("rrin", settings=["batch=2"]), tmp_path / "run", machines=Machines(2, accelerator="cpu"))
     assert ended == ["clips"]
 

@@ -88,7 +88,7 @@ def test_a_time_that_is_none_is_refused(t_ns: Any) -> None:
         sensor.step(light, 0)
         with pytest.raises(UsageError, match="expected a whole number of nanoseconds"):
             sensor.step(light, t_ns)
-    with pytest.raises(UsageError, match="1 times for 1 frames of light: expected a list"):
+    with pytest.raises(UsageError, match="1 time for 1 frame of light: expected a list"):
         Dvs(DvsSpec(), (2, 2)).steps(np.zeros((1, 2, 2)), 5)  # type: ignore[arg-type]
 
 

@@ -192,7 +192,7 @@ def test_a_stream_without_times_is_placed_by_its_rate(encode) -> None:
     path = encode("a.h264", flat([10, 20, 30]), codec="libx264", time_base=Fraction(1, 25))
     source = open_source(path)
     assert [frame.t_ns for frame in source.frames()] == [0, 40_000_000, 80_000_000]
-    assert "3 frames without a presentation time were placed at 25 fps" in source.warnings[0]
+    assert "placed at 25 fps: 3 frames without a presentation time" in source.warnings[0]
     assert [frame.t_ns for frame in open_source(path, fps=1000).frames()] == [0, 1_000_000, 2_000_000]
 
 

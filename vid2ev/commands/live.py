@@ -12,7 +12,7 @@ import click
 
 from vid2ev.commands import KEPT, say_interrupted
 from vid2ev.interrupts import heard
-from vid2ev.terminal import COMPILING, bar_of
+from vid2ev.terminal import COMPILING, bar_of, counted
 
 if TYPE_CHECKING:
     from vid2ev.cluster.task import Task
@@ -88,7 +88,7 @@ class Live:
             parts.append(f"{compiling} {COMPILING}")
         if events := sum(task.events for task in tasks):
             made = sum(task.events - task.events_before for task in tasks)
-            parts += [f"{events:,} events", f"{made / (time.monotonic() - self._began_s):,.0f}/s"]
+            parts += [counted(events, "event"), f"{made / (time.monotonic() - self._began_s):,.0f}/s"]
         return ", ".join(parts)
 
     def _show(self) -> None:

@@ -11,6 +11,7 @@ import click
 
 from vid2ev.commands.options import SECONDS, FiniteRange
 from vid2ev.interrupts import heard
+from vid2ev.terminal import counted
 
 
 @click.command(short_help="Make a film or a picture of any event file.")
@@ -105,7 +106,7 @@ def _of_people(by: str) -> str:
 
 def _facts(made: dict[str, Any]) -> list[tuple[str, str]]:
     many, (width, height) = made["frames"], made["size"]
-    pictures = f"{many:,} picture{'s' * (many > 1)} of {width}x{height}"
+    pictures = f"{counted(many, 'picture')} of {width}x{height}"
     film = f", {made['fps']:g} per second: {many / made['fps']:.3g} s" if made["kind"] == "mp4" else ""
     densest = f", the densest of {made['slices']:,}" if many < made["slices"] else ""
     return [

@@ -149,7 +149,7 @@ def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet:
             source = SceneSource(World(file, seed, renderer=renderer), file.name, seed=seed, fps=options["fps"])
             often = f"{float(options['fps']):.12g} fps" if options["fps"] else "all instants"
             how = f"{file.name}, seed {seed}, {often}"
-            how += f", Cycles with {renderer.samples} samples" if renderer else ""
+            how += f", Cycles with {counted(renderer.samples, 'sample')}" if renderer else ""
             new = write_scene(directory, source, contents, how, report=report, **keep)
         frames, seconds = len(source.instants), source.duration_expected_s
         if not quiet:

@@ -93,7 +93,8 @@ def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: boo
     per_s = counts["events"] / seconds if seconds else 0.0
     rate = f", {short(per_s)}/s, {short(per_s / width / height)}/s per pixel"
     share = f", {100 * counts['on'] / counts['events']:.1f} % ON" if counts["events"] else ""
-    return f"{counts['events']:,}{'' if named else ' events'}{rate if seconds else ''}{share}"
+    events = f"{counts['events']:,}" if named else counted(counts["events"], "event")
+    return f"{events}{rate if seconds else ''}{share}"
 
 
 def _duration(result: Mapping[str, Any]) -> tuple[str, str]:
@@ -110,7 +111,7 @@ def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     seconds, video_s = manifest["run"]["seconds"], result["duration_us"] / 1e6
     ratio = f", {of_the_clip(seconds, video_s)}" if seconds and video_s else ""
     threads = manifest["run"]["threads"]
-    took = f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}"
+    took = f"{seconds:.1f} s{ratio}, {counted(threads, 'sensor thread')}"
     slept, of = map(sum, zip((0, 0), *manifest["run"].get("strips_slept", {}).values(), strict=True))
     device = device_facts(manifest["run"].get("device", {"asked": "cpu"}))
     return [
@@ -175,7 +176,7 @@ def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     if count:
         found.append(("time", f"{first} ... {last} us ({spread:.6f} s), counted from {facts['start_us']} us"))
     if facts["times_going_back"]:
-        found.append(("order", f"times go back at {facts['times_going_back']:,} places"))
+        found.append(("order", f"times go back at {counted(facts['times_going_back'], 'place')}"))
     said = {key.replace("_", " "): value for key, value in facts["stored"].items() if value is not None}
     stored = [facts["format"], *(f"{key} {value}" for key, value in said.items() if not isinstance(value, dict | list))]
     stored += [f"{facts['bytes'] / count:.2f} bytes per event"] if count else []
@@ -185,7 +186,7 @@ def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _parts(upsampling: Mapping[str, Any], auto: str) -> str:
     parts = upsampling["subframes"]
-    return auto.format(upsampling["max_subframes"]) if parts == "auto" else f"in {parts} parts"
+    return auto.format(upsampling["max_subframes"]) if parts == "auto" else f"in {counted(parts, 'part')}"
 
 
 def short(number: float) -> str:

@@ -23,6 +23,7 @@ from vid2ev.compare.by_pixel import ByPixel, by_pixel
 from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
 from vid2ev.compare.matching import WINDOW_US, match
 from vid2ev.stream.events import Events
+from vid2ev.terminal import counted
 
 BINS = 100  # parts of the time for which the distance is kept
 LATEST_US = 2 * 10**18  # 63,000 years, nanoseconds since 1970 among them: of differences, twice as much fits in 64 bits
@@ -112,7 +113,7 @@ class Comparison:
         wrong = "" if self.count_error is None else f"; count error {_percent(self.count_error)}, pixel by pixel"
         facts = [
             ("distance", f"{headline}{beside} (van Rossum; 0: the same, 1 or more: nothing in common)"),
-            ("counts", f"{self.events:,} events against {self.reference_events:,} of the reference{wrong}"),
+            ("counts", f"{counted(self.events, 'event')} against {self.reference_events:,} of the reference{wrong}"),
         ]
         if not all(events):
             return [*facts, ("matched", f"nothing: {'the reference' if self.events else 'it'} has no events"), span]
@@ -123,7 +124,7 @@ class Comparison:
             bias_us = self.timing_error_us or 0
             lateness = f"{abs(bias_us)} us {'early' if bias_us < 0 else 'late'}"
             facts.append(("timing", f"{median_us} us median error, {most_us} us 95th percentile; {lateness} (median)"))
-        return [*facts, ("polarity", f"{self.polarity_errors:,} events of the wrong polarity"), span]
+        return [*facts, ("polarity", f"{counted(self.polarity_errors, 'event')} of the wrong polarity"), span]
 
     def _span(self) -> tuple[str, str]:
         first_us, last_us = self.span_us

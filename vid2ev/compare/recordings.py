@@ -27,6 +27,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import open_events, survey
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.stream.events import Events
+from vid2ev.terminal import counted
 from vid2ev.untrusted import check_bytes
 
 LIMIT = 1 << 25  # events in memory at a time: 0.7 GB
@@ -69,7 +70,7 @@ class Compared:
         if any(self.left_out):
             one, other = self.left_out
             facts.append(
-                ("left out", f"{one:,} events, {other:,} of the reference: outside of the time that both have")
+                ("left out", f"{counted(one, 'event')}, {other:,} of the reference: outside of the time that both have")
             )
         facts += [(f"{name} alone", str(one)) for name, one in zip("AB", self.alone or (), strict=False)]
         return [*facts, *(("warning", text) for text in self.warnings)]

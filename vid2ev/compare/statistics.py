@@ -30,6 +30,7 @@ import numpy as np
 from vid2ev.compare.comparison import percentile
 from vid2ev.compiling.cache import cached
 from vid2ev.stream.events import Events
+from vid2ev.terminal import counted
 
 NEIGHBOUR_US = 5000
 PER_DECADE = 8
@@ -102,7 +103,7 @@ class Statistics:
 
     def __str__(self) -> str:
         if self.rate_hz is None or self.on_share is None:
-            return f"{self.events} events"
+            return counted(self.events, "event")
         text = f"{self.rate_hz:.3g} events/pixel/s, {100 * self.on_share:.3g} % ON; {self.isolated_hz:.3g} isolated"
         if self.shortest_us is None:
             return text

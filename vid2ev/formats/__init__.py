@@ -21,6 +21,7 @@ from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording,
 from vid2ev.formats.matlab import refuse_mat
 from vid2ev.formats.order import Disorder, ordered
 from vid2ev.stream.events import Events
+from vid2ev.terminal import counted
 from vid2ev.untrusted import check_file, limit_for, most_bytes
 
 __all__ = [
@@ -176,7 +177,7 @@ def _note_disorder(file: EventFile, disorder: Disorder) -> None:
             " holds several recordings, or is damaged; take a part of it"
         )
     if disorder.places:
-        said = f"times go back at {disorder.places:,} places, by at most {disorder.depth_us} us: put in order"
+        said = f"times go back at {counted(disorder.places, 'place')}, by at most {disorder.depth_us} us: put in order"
         file.warnings.extend([said] if said not in file.warnings else [])
 
 

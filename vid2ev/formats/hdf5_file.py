@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import DataError, read_as
 from vid2ev.formats.eager import EagerFile
+from vid2ev.terminal import counted
 from vid2ev.untrusted import check_bytes
 
 if TYPE_CHECKING:
@@ -87,8 +88,8 @@ def check_chunks(dataset: h5py.Dataset, path: Path) -> None:
         code, _, values, _ = packed.get_filter(number)
         if len(values) < FILTERS.get(code, math.inf):
             raise DataError(
-                f"{path}: {dataset.name} is packed by HDF5's filter {code} with {len(values)} numbers, which is not"
-                " read; get another copy, or pack it with gzip, Blosc or Zstandard (h5repack)"
+                f"{path}: {dataset.name} is packed by HDF5's filter {code} with {counted(len(values), 'number')}, which"
+                " is not read; get another copy, or pack it with gzip, Blosc or Zstandard (h5repack)"
             )
     check_bytes(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize, f"a chunk of {dataset.name}")
 

@@ -24,6 +24,8 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
+from vid2ev.terminal import counted
+
 MAGIC = b"#ROSBAG V2.0\n"
 BAG, CHUNK, CONNECTION, MESSAGE = 3, 5, 7, 2
 LARGEST = 1 << 28  # bytes of a chunk
@@ -106,7 +108,7 @@ class BagReader:
         except EOFError:
             if self._index_at:
                 raise ValueError("a record leaves the bag") from None
-            text = f"{self.path}: the recording was interrupted; {left} bytes at its end are left out"
+            text = f"{self.path}: the recording was interrupted; read without {counted(left, 'byte')} at its end"
             self.warnings += [] if text in self.warnings else [text]
 
 

@@ -28,6 +28,7 @@ from vid2ev.sensors.course import Course, course_of
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.terminal import counted
 from vid2ev.views.requests import parse_representation
 
 VIEWS = {"polarity": "counts", "event frame": "frame:2", "time surface": "time-surface:10ms", "light": "light"}
@@ -164,7 +165,7 @@ class Previewer:
         gathering.add(events)
         found = gathering.statistics(span_us)
         picture = _lit(frames[-1].light) if request.view == "light" else _drawn(events, mount, request.view, span_us)
-        caption = f"{len(events):,} events" + (
+        caption = counted(len(events), "event") + (
             "" if found.rate_hz is None else f", {found.rate_hz:.3g} per pixel and s"
         )
         return Shown(mount.name, mount.kind, mount.size, _png(picture), caption, found)

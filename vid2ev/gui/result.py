@@ -16,6 +16,7 @@ from vid2ev.gui.stage import Stage
 from vid2ev.gui.tasks import costed, gathered, planned
 from vid2ev.gui.theme import say
 from vid2ev.plan.plan import Plan
+from vid2ev.terminal import counted
 
 NO_PIXEL = "Click a pixel of an event camera to follow it."
 TABS = ("Pixel", "Plan", "World", "Cost", "Compare", "Record")
@@ -77,7 +78,8 @@ class Results:
         elif answer.course is not None:
             pixel = answer.pixel
             shown = answer.cameras[pixel[0]]
-            self._followed.text = f"{shown.name}, pixel {pixel[1]}, {pixel[2]}: {len(answer.course.events)} events"
+            events = counted(len(answer.course.events), "event")
+            self._followed.text = f"{shown.name}, pixel {pixel[1]}, {pixel[2]}: {events}"
             self._course.options.clear()
             self._course.options.update(course_chart(answer.course))
             self._course.set_visibility(True)

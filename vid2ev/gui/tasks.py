@@ -83,6 +83,6 @@ def gathered(tell: Tell, path: str) -> Any:
     for events in recording.blocks():
         gathering.add(events)
         seen += len(events)
-        tell(seen, recording.count, f"{seen:,} events")
+        tell(seen, recording.count, counted(seen, "event"))
     start_us = recording.start_us
     return gathering.statistics((start_us, start_us + recording.duration_us) if file.says_start else None)

@@ -30,6 +30,7 @@ from vid2ev.sensors.limits import check_threads
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sources import begins_s, short_name
+from vid2ev.terminal import counted
 from vid2ev.tracks.outputs import Outputs
 from vid2ev.tracks.parts import Made
 from vid2ev.tracks.recorder import Progress, Recorder, growing, progress_of
@@ -300,7 +301,7 @@ def _record(recorder: Recorder, planner: Planner | None, course: _Course, began:
             work += max(STEP, sum(math.prod(frame.light.shape) for frame in instant.frames))
             if instant.original and course.report and course.report(recipe, done) is True:
                 done.by_hand = True
-                done.warnings.append(f"ended by hand after {done.frames} frames")
+                done.warnings.append(f"ended by hand after {counted(done.frames, 'frame')}")
                 break
             if instant.original and work >= course.piece:
                 done.looked, done.ended = (planner.looked, planner.ended) if planner else (0, False)

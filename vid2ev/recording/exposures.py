@@ -34,6 +34,7 @@ from vid2ev.light.picture_files import decoded
 from vid2ev.light.tags import tag_of
 from vid2ev.recording.disk import sync, whole_file
 from vid2ev.stream.exposures import Exposure
+from vid2ev.terminal import counted
 from vid2ev.untrusted import first_line, read_lines
 
 KINDS = {"raw": "raw", "png": "frames", "mp4": "frames.mp4"}  # and what they are called
@@ -76,7 +77,8 @@ class ExposureFiles:
             there = [path for path in folder.glob("*.png") if path.stem.isdecimal() and int(path.stem) < count]
             if (held := min(len(lines), len(there))) < count:
                 raise SavedError(
-                    f"{folder} holds {held} pictures with times, expected {count}; start again with --overwrite"
+                    f"{folder} holds {counted(held, 'picture')} with times, expected {count}; start again with"
+                    " --overwrite"
                 )
             with whole_file(times) as file:
                 file.write("".join([HEADER, *lines[:count]]).encode())
@@ -138,13 +140,14 @@ def read_spans(path: Path) -> np.ndarray:
     try:
         rows = [[int(word) for word in line.split()] for line in lines if line.strip() and line.lstrip()[0] != "#"]
         if bad := next((row for row in rows if len(row) != 2), None):
-            raise ValueError(f"{len(bad)} numbers on a line")
+            raise ValueError(f"{counted(len(bad), 'number')} on a line")
         spans = np.array(rows, np.int64).reshape(-1, 2)
     except (ValueError, OverflowError) as error:
         said = first_line(error, 100)
         raise DataError(f"{path}: cannot be read ({said}); expected two times in us on every line") from error
     if not len(spans) or np.abs(spans.astype(np.float64)).max() >= LATEST_US or np.any(spans[:, 1] < spans[:, 0]):
-        raise DataError(f"{path}: {len(spans)} exposures, or one that ends before it begins; make the recording again")
+        found = counted(len(spans), "exposure")
+        raise DataError(f"{path}: {found}, or one that ends before it begins; make the recording again")
     return spans
 
 

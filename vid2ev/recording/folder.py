@@ -34,6 +34,7 @@ from vid2ev.recording.destination import begun_at, check_apart, check_folder, pa
 from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
 from vid2ev.recording.held import LOCK, Held, undisturbed
 from vid2ev.recording.manifest import is_of_job, read_manifest
+from vid2ev.terminal import counted
 from vid2ev.untrusted import read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else
@@ -201,7 +202,8 @@ class Folder:
             there = path.stat().st_size if path.is_file() else 0
             if not 0 <= sizes[name] <= there:
                 raise SavedError(
-                    f"{path} has {there:,} bytes, and {sizes[name]:,} at the last checkpoint; --overwrite starts again"
+                    f"{path} has {counted(there, 'byte')}, and {sizes[name]:,} at the last checkpoint; --overwrite"
+                    " starts again"
                 )
 
     def _write_job(self) -> None:

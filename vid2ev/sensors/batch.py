@@ -14,6 +14,7 @@ from vid2ev.sensors.limits import check_threads
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
+from vid2ev.terminal import counted
 
 if TYPE_CHECKING:
     from vid2ev.views.grid import Grid
@@ -90,7 +91,8 @@ class DvsBatch:
         """`steps`, but the events of each clip go straight into a grid of its own (`Dvs.fill`)."""
         light, times = self._checked(light, t_ns)
         if len(grids) != len(self._sensors):
-            raise UsageError(f"{len(grids)} grids for {len(self._sensors)} clips: expected one for each")
+            given, clips = counted(len(grids), "grid"), counted(len(self._sensors), "clip")
+            raise UsageError(f"{given} for {clips}: expected one for each")
         self._all(lambda k: self._sensors[k].fill_of(grids[k], light, k, times[k]))
 
     def _checked(self, light: Any, t_ns: Any) -> tuple[np.ndarray, list[list[int]]]:
@@ -114,8 +116,6 @@ def cameras_of(specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence
     or cameras than of these."""
     cameras = cameras if cameras is not None else [0] * len(specs)
     if not specs or not len(specs) == len(seeds) == len(cameras):
-        raise UsageError(
-            f"a batch of {len(specs)} specs, {len(seeds)} seeds and {len(cameras)} cameras: expected one of each for"
-            " every sensor, and at least one"
-        )
+        given = f"{counted(len(specs), 'spec')}, {counted(len(seeds), 'seed')} and {counted(len(cameras), 'camera')}"
+        raise UsageError(f"a batch of {given}: expected one of each for every sensor, and at least one")
     return cameras

@@ -17,6 +17,7 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 from vid2ev.errors import UsageError
+from vid2ev.terminal import counted
 
 DEVICES = ("cpu", "cuda", "auto")
 SIMULATED = "simulated"  # for tests
@@ -90,7 +91,7 @@ def too_little(work: Work, threads: int) -> str:
     if card_s < cpu_s:
         return ""
     unknown = f"; its length is unknown, and taken for {UNKNOWN_FRAMES} frames" * (work.frames is None)
-    return f"about {cpu_s:.2g} s of {threads} thread{'s' * (threads > 1)}, and {card_s:.2g} s of a GPU{unknown}"
+    return f"about {cpu_s:.2g} s of {counted(threads, 'thread')}, and {card_s:.2g} s of a GPU{unknown}"
 
 
 def missing_for_cuda() -> str:

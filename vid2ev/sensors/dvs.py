@@ -25,6 +25,7 @@ from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.saved import check_mark, clock, mark_of
 from vid2ev.stream.still import Still, nothing_told, told_of
+from vid2ev.terminal import counted
 
 if TYPE_CHECKING:
     from vid2ev.views.grid import Grid
@@ -133,7 +134,8 @@ class Dvs:
         """
         self._intake.check(np.shape(light)[2:])
         if np.shape(t_ns) != (len(light),):
-            raise UsageError(f"{np.size(t_ns)} times for {len(light)} frames of light: expected a list of one for each")
+            given, frames = counted(np.size(t_ns), "time"), counted(len(light), "frame")
+            raise UsageError(f"{given} for {frames} of light: expected a list of one for each")
         times: list[int] = []
         for t in t_ns:
             times.append(later(t, times[-1] if times else self._t_ns))

@@ -29,6 +29,7 @@ from vid2ev.sources.times import (
     times_beside,
 )
 from vid2ev.stream.frames import Colour, Frame
+from vid2ev.terminal import counted
 
 
 class ArrayStack:
@@ -111,7 +112,8 @@ class ArrayStack:
             times, unit = self._stack.times
             self._stamps, self._unit = stamps_of_array(times, self.path, unit)
             if len(self._stamps) != count:
-                raise DataError(f"{self.path}: {len(self._stamps)} times for {count} frames; expected one each")
+                found, frames = counted(len(self._stamps), "time"), counted(count, "frame")
+                raise DataError(f"{self.path}: {found} for {frames}; expected one each")
         elif isinstance(self._stack, NpzStack) and self._stack.fps is not None:
             self._fps = parse_fps(self._stack.fps)
         else:

@@ -45,6 +45,7 @@ from vid2ev.sources.times import (
     times_beside,
 )
 from vid2ev.stream.frames import Colour, Frame
+from vid2ev.terminal import counted
 from vid2ev.untrusted import json_of, read_text
 
 TIMESTAMPS = "timestamps.txt"
@@ -164,7 +165,8 @@ class Images:
             )
         stamps, unit = read_timestamps(file, [place.name for place, _ in self._places])
         if len(stamps) != len(self._places):
-            raise DataError(f"{file}: {len(stamps)} times for {len(self._places)} images; expected one per image")
+            found, images = counted(len(stamps), "time"), counted(len(self._places), "image")
+            raise DataError(f"{file}: {found} for {images}; expected one per image")
         return stamps, unit
 
 
@@ -226,7 +228,7 @@ def _remarks_on_gaps(files: Sequence[Path]) -> list[str]:
     first, more = gaps[0], len(gaps) - 1
     return [
         f"{files[0].parent}: none between {files[first].name} and {files[first + 1].name}"
-        + f", nor in {more} other gap{'s' * (more > 1)}" * (more > 0)
+        + f", nor in {counted(more, 'other gap')}" * (more > 0)
         + f"; with --fps images are evenly apart, whatever their numbers; {TIMESTAMPS} says other times"
     ]
 

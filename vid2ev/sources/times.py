@@ -30,6 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.requests import is_finite
+from vid2ev.terminal import counted
 from vid2ev.untrusted import check_file, first_line, read_array, read_lines
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
@@ -112,8 +113,8 @@ class Clock:
             remarks.append(f"dropped {self.dropped} of {self.frames} frames whose time is not after the frame before")
         if self.without_stamp:
             remarks.append(
-                f"{self.without_stamp} frames without a presentation time were placed at {float(self.rate or 0):g} fps;"
-                " give --fps if that is wrong"
+                f"placed at {float(self.rate or 0):g} fps: {counted(self.without_stamp, 'frame')} without a"
+                " presentation time; give --fps if that is wrong"
             )
         return remarks
 
@@ -138,7 +139,8 @@ def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
         raise UsageError(f"{path}: frames without times; give --fps, or put {path.stem}_timestamps.npy beside it")
     stamps, unit = read_timestamp_array(file) if file.suffix == ".npy" else read_timestamps(file)
     if len(stamps) != frames:
-        raise DataError(f"{path}: {len(stamps)} times beside it for {frames} frames; expected one each")
+        found = counted(len(stamps), "time")
+        raise DataError(f"{path}: {found} beside it for {counted(frames, 'frame')}; expected one each")
     return stamps, unit
 
 

@@ -25,6 +25,7 @@ from vid2ev.sources.footage import Footage, stamp_of
 from vid2ev.sources.planes import codes_of, halvings_of, orientation_of, planar, upright
 from vid2ev.sources.times import Clock, parse_fps
 from vid2ev.stream.frames import Colour, Frame
+from vid2ev.terminal import counted
 
 
 class Video:
@@ -127,7 +128,7 @@ class Video:
         """A remark if a file that announces no number of frames ends well before the time it announces, or lacks some
         of its bytes."""
         footage, stamp = self._footage, None if last is None else stamp_of(last)
-        cut = [f"truncated: the last {footage.missing:,} bytes of the file are missing"] * (footage.missing > 0)
+        cut = [f"truncated: the file lacks {counted(footage.missing, 'byte')} at its end"] * (footage.missing > 0)
         if footage.planned or footage.end_s is None or stamp is None or not footage.rate:
             return cut
         seen_s = stamp + max(2 / footage.rate, (last.duration or 0) * Fraction(last.time_base))

@@ -11,6 +11,7 @@ from vid2ev.recording.exposures import KINDS, ExposureFiles
 from vid2ev.recording.folder import Folder
 from vid2ev.sensors.cis import Cis
 from vid2ev.stream.frames import Frame
+from vid2ev.terminal import counted
 from vid2ev.tracks import NEVER_US
 from vid2ev.tracks.outputs import Outputs
 
@@ -78,8 +79,8 @@ class CisTrack:
             remarks.append("the light is shorter than an exposure: there are no frames")
         if counts["not_finite"]:
             remarks.append(
-                f"{counts['not_finite']} values of light were not finite, beyond 1e30, or negative where colours"
-                " cannot be; they count as 0 or 1e30"
+                f"{counted(counts['not_finite'], 'value')} of light not finite, beyond 1e30, or negative where"
+                " colours cannot be; taken for 0 or 1e30"
             )
         if "mp4" in self._files.kinds and counts["frames"]:
             remarks += remarks_on_size(KINDS["mp4"], self.cis.size)

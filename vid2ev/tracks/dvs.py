@@ -22,6 +22,7 @@ from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.terminal import counted
 from vid2ev.tracks import NEVER_US
 from vid2ev.tracks.outputs import Outputs
 from vid2ev.views.on_disk import KINDS
@@ -134,13 +135,13 @@ class DvsTrack:
         counts, remarks = self.dvs.counts, []
         if counts["capped"]:
             remarks.append(
-                f"{counts['capped']} times a pixel had more than max_crossings = {self.dvs.spec.max_crossings}"
-                " crossings from frame to frame; the rest is missing"
+                f"{counted(counts['capped'], 'time')} a pixel had more than max_crossings ="
+                f" {self.dvs.spec.max_crossings} crossings from frame to frame; the rest is missing"
             )
         if counts["not_finite"]:
             remarks.append(
-                f"{counts['not_finite']} values of light were negative, not finite or beyond 1e30; they count as 0 or"
-                " 1e30"
+                f"{counted(counts['not_finite'], 'value')} of light negative, not finite or beyond 1e30; taken for"
+                " 0 or 1e30"
             )
         for key, (on, off) in self.dvs.spec.reached_spreads().items():
             remarks.append(

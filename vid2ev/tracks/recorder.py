@@ -23,6 +23,7 @@ from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.presets import sensor_file_text
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sources.framing import framing_of
+from vid2ev.terminal import counted
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
@@ -286,7 +287,7 @@ def _remarks(done: Progress, kind: str) -> list[str]:
         remarks.append("one frame only: nothing changes, so there are no events")
     if events and done.cuts_us:
         remarks.append(
-            f"{len(done.cuts_us)} cut{'s' * (len(done.cuts_us) > 1)}: the sensor starts afresh there; --cuts keep takes"
+            f"{counted(len(done.cuts_us), 'cut')}: the sensor starts afresh there; --cuts keep takes"
             " a cut for a step of light"
         )
     if done.limited:

@@ -17,6 +17,7 @@ import numpy as np
 from vid2ev.formats.event_file import Picture
 from vid2ev.pictures.colours import GROUND, in_8_bits
 from vid2ev.stream.events import Events
+from vid2ev.terminal import counted
 from vid2ev.views.representation import Kind, Representation, Slice
 
 DARK = in_8_bits(GROUND)
@@ -70,7 +71,7 @@ class Canvas:
 
     def _write(self, part: Slice, line: np.ndarray) -> None:
         line[:] = DARK
-        left, right = f"{(part.stop_us - self._zero_us) / 1e6:.{self._digits}f} s", f"{part.events:,} events"
+        left, right = f"{(part.stop_us - self._zero_us) / 1e6:.{self._digits}f} s", counted(part.events, "event")
         widths = [cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0] for text in (left, right)]
         if INSET + widths[0] > self.size[0]:
             return  # (of a time that is cut, what is left reads as another)

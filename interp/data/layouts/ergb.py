@@ -128,7 +128,7 @@ class Ergb:
         """The first times for as many pictures; the last ones where only these increase: lines above them are wrong."""
         some = min(len(pictures), len(stamps))
         which = "last" if not _increase(stamps[:some]) and _increase(stamps[-some:]) else "first"
-        self.remarks.append(f"{_both(pictures, stamps)}: the {which} {some} are taken for pairs")
+        self.remarks.append(f"{_both(pictures, stamps)}: pairs are made of the {which} {some}")
         return stamps[-some:] if which == "last" else stamps[:some]
 
     def _of_numbers(self, pictures: list[Path], stamps: list[int | None]) -> list[int | None]:

@@ -11,6 +11,7 @@ from interp.evaluate.figures.layout import GAP_PX, below, beside, check_pictures
 from interp.evaluate.figures.lettering import GROUND, STRIP_PX, letters, strip, write
 from interp.evaluate.figures.png import write_png
 from vid2ev.errors import UsageError
+from vid2ev.terminal import counted
 
 HEIGHT_PX = 160  # of pictures on the sheet
 MARGIN_PX = 8
@@ -48,10 +49,12 @@ def write_moments(
 
 def _check(lines: Mapping[str, Sequence[np.ndarray]], moments: Sequence[str]) -> None:
     if not lines or not moments:
-        raise UsageError(f"a sheet of {len(lines)} lines by {len(moments)} moments: expected at least one of each")
+        asked = f"{counted(len(lines), 'line')} by {counted(len(moments), 'moment')}"
+        raise UsageError(f"a sheet of {asked}: expected at least one of each")
     for name, pictures in lines.items():
         if len(pictures) != len(moments):
-            raise UsageError(f"{name}: {len(pictures)} pictures; expected {len(moments)}, one for each moment")
+            found = counted(len(pictures), "picture")
+            raise UsageError(f"{name}: {found}; expected {len(moments)}, one for each moment")
     check_pictures(**{f"{name}, {k}": one for name, pictures in lines.items() for k, one in enumerate(pictures)})
 
 

@@ -10,6 +10,7 @@ from interp.evaluate.report.numbers import PSNR_DIGITS, SSIM_DIGITS, number, spr
 from interp.evaluate.report.overview import by_method
 from interp.evaluate.row import Row
 from interp.evaluate.tables import least, pooled
+from vid2ev.terminal import counted
 
 PUBLISHED = "published, other data"
 FORM = ("mean", "least frame", "least patch (99×99)", "standard deviation")
@@ -50,8 +51,8 @@ def comparison_table(rows: Sequence[Row]) -> Table:
         ("method", "data", "SSIM", "PSNR"),
         tuple(lines),
         "In the form of the paper's Table III",
-        f"{skipped} frames skipped. Quoted rows are of other recordings and cameras, those of GoPro by a PSNR that may"
-        " be another; they say what kind of number to expect, and nothing about which method is better.",
+        f"{counted(skipped, 'frame')} skipped. Quoted rows are of other recordings and cameras, those of GoPro by a"
+        " PSNR that may be another; they say what kind of number to expect, and nothing about which method is better.",
         words=2,
     )
 

@@ -27,6 +27,7 @@ from interp.evaluate.report.overview import (
 from interp.evaluate.report.worst import WorstFrame, worst_blocks
 from interp.evaluate.row import Row
 from interp.evaluate.tables import pooled, split
+from vid2ev.terminal import counted
 
 TITLE = "How well the frames between were rebuilt"
 FROM_TRUTH = (
@@ -43,7 +44,7 @@ def document(rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()
     if not rows:
         opening.append(Text("No frame was scored.", warning=True))
     sections = [
-        Section(f"{title}, {multiple - 1} frames skipped" if len(gaps) > 1 else title, tuple(blocks))
+        Section(f"{title}, {counted(multiple - 1, 'frame')} skipped" if len(gaps) > 1 else title, tuple(blocks))
         for multiple in sorted(gaps)
         for title, blocks in _chapter(gaps[multiple], about.get("sets", {})).items()
     ]

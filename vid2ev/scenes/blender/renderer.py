@@ -30,6 +30,7 @@ from vid2ev.scenes.blender.program import Blender, find_blender
 from vid2ev.scenes.render import Picture
 from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world import World
+from vid2ev.terminal import counted
 from vid2ev.untrusted import openexr
 
 SAMPLES = 32
@@ -90,7 +91,7 @@ class Cycles:
         if not self._pictures:
             return ""
         each_s = self._seconds / self._pictures
-        return f"Blender {self._version}, Cycles: {self._pictures:,} pictures, {each_s:.2g} s each"
+        return f"Blender {self._version}, Cycles: {counted(self._pictures, 'picture')}, {each_s:.2g} s each"
 
     def close(self) -> None:
         """End Blender."""
