@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vid2ev.commands.options import FiniteRange
+from vid2ev.commands.options import FiniteRange, Rate
 from vid2ev.commands.worker_options import worker_options
 
 if TYPE_CHECKING:
@@ -28,6 +28,10 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
 @click.option(
     "--slowdown", type=FiniteRange(0, min_open=True), default=1.0, show_default=True, metavar="F",
     help="The videos play F times slower than the world went.",
+)  # fmt: skip
+@click.option(
+    "--fps", type=Rate(), metavar="RATE",
+    help="Of the videos, in place of their own times; for folders of pictures without times.",
 )  # fmt: skip
 @click.option(
     "--preset", type=click.Choice(["varied", "paper"]), default="varied", show_default=True,

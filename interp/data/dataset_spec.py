@@ -19,14 +19,15 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from interp.data.chance import chance, uniform
 from interp.data.sensor_ranges import SENSORS, SensorRanges
-from interp.data.video_shots import film_at, length_of
-from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_sensor
+from interp.data.video_shots import length_of
+from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_sensor, open_source
 from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
 from vid2ev.sources import begins_s, is_single_picture
 from vid2ev.sources.cut import FASTEST, SLOWEST
 from vid2ev.sources.source import LARGEST
+from vid2ev.sources.times import SLOWEST_HZ
 from vid2ev.terminal import counted
 
 Side = Annotated[int, Field(ge=1, le=LARGEST)]
@@ -49,6 +50,9 @@ class DatasetSpec(BaseModel):
     slowdown: float = Field(
         default=1.0, ge=FASTEST, le=SLOWEST, description="how many times slower than the world these play"
     )
+    fps: float | None = Field(
+        default=None, ge=SLOWEST_HZ, le=1e9, description="of these, in place of their own times [Hz]"
+    )
     frames: int = Field(default=7, ge=2, le=10**6, description="of the frame camera, in a scene")
     cis_fps: float = Field(default=30.0, ge=0.01, le=30_000, description="of the frame camera [Hz]")
 
@@ -56,6 +60,8 @@ class DatasetSpec(BaseModel):
     def _fits(self) -> DatasetSpec:
         if self.slowdown != 1 and not self.videos:
             raise ValueError(f"slowdown {self.slowdown:g} without videos; name some with --from, or leave it out")
+        if self.fps is not None and not self.videos:
+            raise ValueError(f"fps {self.fps:g} without videos; name some with --from, or leave it out")
         if "size" in self.model_fields_set and self.videos:
             width, height = self.size
             raise ValueError(f"size {width}x{height} of videos, which are seen as they are; leave it out")
@@ -136,7 +142,7 @@ def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
     """Of one video."""
     if is_single_picture(Path(video)):
         raise UsageError(f"{video}: a single picture; give a video, or a folder that holds a sequence of pictures")
-    source = film_at(video)
+    source = open_source(video, fps=spec.fps)
     count, seconds = length_of(source, video)
     frame_s = seconds / max(count, 1)
     rig, exposure_s = _rig(spec, place)
@@ -150,7 +156,8 @@ def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
     begin_s = begins_s(source)  # (of films cut out of others it is not 0, and start and stop are by their clock)
     for part in range(math.floor(seconds / length_s)):
         start_s = round(begin_s + part * length_s, 6)
-        options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9), "slowdown": spec.slowdown}
+        options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9)}
+        options |= {"slowdown": spec.slowdown, "fps": spec.fps}
         name = f"{Path(video).stem}-{place:03d}-{part:05d}"
         yield Scene(name, video, options | {"seed": int(chance(spec.seed, name).integers(1 << 62))})
 

@@ -10,6 +10,7 @@ from interp.data.chance import Range, Share, has_some, within
 from interp.data.sensor_ranges import SENSORS, SensorRanges
 from vid2ev.scenes.scene_file import scene_names
 from vid2ev.scenes.textures import PHOTOGRAPHS
+from vid2ev.sources.times import SLOWEST_HZ
 
 HELD_OUT = ("coffee", "motorcycle", "gravel", "rocket")  # photographs that are kept for validation
 TRAINED_ON = tuple(name for name in PHOTOGRAPHS if name not in HELD_OUT)
@@ -45,6 +46,9 @@ class ClipSettings(BaseModel):
     )
     slowdown: float = Field(
         default=1.0, ge=1e-6, le=1000, description="how many times slower than the world the videos play"
+    )
+    fps: float | None = Field(
+        default=None, ge=SLOWEST_HZ, le=1e9, description="of the videos, in place of their own times [Hz]; for pictures"
     )
     scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), min_length=1, description="of the scenes")
     textures: tuple[str, ...] = Field(

@@ -36,7 +36,7 @@ def unusable(settings: ClipSettings, films: Sequence[str] = ()) -> list[str]:
             _check_picture("texture", picture)
     for multiple in settings.multiples:
         for film in [*(settings.video_files if settings.videos > 0 else ()), *films]:
-            check_film(film, settings.size, multiple)
+            check_film(film, settings, multiple)
         if settings.recordings > 0:
             found |= dict.fromkeys(left_out(settings, multiple))
     return list(found)

@@ -22,7 +22,6 @@ from vid2ev import DataError, Frame, UsageError, open_source
 from vid2ev.sensors.devices import Device
 from vid2ev.sources import Source, begins_s, is_single_picture
 from vid2ev.stamps import Stamp, stamp
-from vid2ev.stream.frames import Colour
 from vid2ev.terminal import counted
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
@@ -46,7 +45,7 @@ class VideoShot:
         draw = chance(seed, "video", number)
         for _ in range(TRIES):
             name = settings.video_files[int(draw.integers(len(settings.video_files)))]
-            source, begin_s = _opened(name)
+            source, begin_s = _opened(name, settings.fps)
             after_s, part = _place(source, name, settings.size, multiple, draw)
             start_s, self._frames = _drawn(source, begin_s, after_s, _wanted(multiple), part, settings.size, name)
             if not _is_cut(self._frames):
@@ -94,7 +93,7 @@ def _wanted(multiple: int) -> int:
     return _before(multiple) + multiple + 2
 
 
-def check_film(name: str, size: tuple[int, int], multiple: int) -> None:
+def check_film(name: str, settings: ClipSettings, multiple: int) -> None:
     """Raise UsageError for a film that is none, too short or too small for clips, DataError for one that cannot be
     read."""
     if is_single_picture(Path(name)):
@@ -102,7 +101,7 @@ def check_film(name: str, size: tuple[int, int], multiple: int) -> None:
             f"{name}: a single picture, expected a video; leave it out, or train with photographs in motion that"
             " --set clips.textures=[...] names"
         )
-    _fitting(_opened(name)[0], name, size, multiple)
+    _fitting(_opened(name, settings.fps)[0], name, settings.size, multiple)
 
 
 def length_of(source: Source, name: str) -> tuple[int, float]:
@@ -116,22 +115,17 @@ def length_of(source: Source, name: str) -> tuple[int, float]:
     return count, seconds
 
 
-def _opened(name: str) -> tuple[Source, float]:
+def _opened(name: str, fps: float | None) -> tuple[Source, float]:
     """A film, and where it begins by its own clock [s]."""
-    return _opened_once(name, stamp(name))
-
-
-def film_at(name: str, colour: Colour = "luminance") -> Source:
-    """A film, whose times are its own: there is no --fps here that its complaints could ask for."""
-    try:
-        return open_source(name, colour=colour)
-    except (UsageError, DataError) as error:
-        raise type(error)(str(error).replace("give --fps, or put", "put")) from error
+    return _opened_once(name, fps, stamp(name))
 
 
 @lru_cache(maxsize=16)
-def _opened_once(name: str, written: Stamp) -> tuple[Source, float]:
-    source = film_at(name, "rgb")
+def _opened_once(name: str, fps: float | None, written: Stamp) -> tuple[Source, float]:
+    try:
+        source = open_source(name, colour="rgb", fps=fps)
+    except (UsageError, DataError) as error:  # (that is how --fps is called here)
+        raise type(error)(str(error).replace("--fps", "--set clips.fps=RATE")) from error
     return source, begins_s(source)
 
 

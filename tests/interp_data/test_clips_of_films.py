@@ -96,6 +96,19 @@ def test_a_slower_film_has_a_shorter_gap(tmp_path: Path) -> None:
     assert made(settings, 0, 0).gap_us == 40_000
 
 
+def test_pictures_without_times_are_a_film_of_the_rate_that_is_said(tmp_path: Path) -> None:
+    frames = np.load(film(tmp_path / "film.npz"))["frames"]
+    (tmp_path / "pictures").mkdir()
+    for k, light in enumerate(frames):
+        write_codes(tmp_path / "pictures" / f"{k}.png", srgb_codes(light))
+    said = FILMS | {"video_files": (str(tmp_path / "pictures"),)}
+    with pytest.raises(UsageError, match=r"images without times; give --set clips\.fps=RATE, or put a"):
+        made(ClipSettings(**said), 0, 0)
+    assert [made(ClipSettings(**said, fps=fps), 0, 0).gap_us for fps in (50, 200)] == [160_000, 40_000]
+    timed = made(ClipSettings(**(said | {"video_files": (str(tmp_path / "film.npz"),)}), fps=200), 0, 0)
+    assert timed.gap_us == 40_000, "of times of its own it is in place of these"
+
+
 @pytest.mark.parametrize("source", ["film", "picture", "scene"])
 def test_what_is_written_again_is_read_again(tmp_path: Path, source: str) -> None:
     """By one process, under its own name: its clips are those of what is there."""
@@ -158,7 +171,7 @@ def test_a_film_that_does_not_say_how_long_it_is_is_not_called_short(tmp_path: P
         container.mux(stream.encode())
     said = r"film\.h264 does not say how long it is, and .*; bring it into a container that does"
     with pytest.raises(UsageError, match=said):
-        check_film(name, (32, 24), 8)
+        check_film(name, ClipSettings(**FILMS, video_files=(name,)), 8)
     with pytest.raises(UsageError, match=said):
         scenes_of(DatasetSpec(videos=(name,), frames=2))
 

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -274,6 +275,7 @@ def test_workers_change_no_byte(made: Path, tmp_path: Path) -> None:
 
 KILLED = """
 import os, signal, sys
+from fractions import Fraction
 from pathlib import Path
 from interp.data.dataset import write_dataset
 from interp.data.dataset_spec import DatasetSpec
@@ -308,6 +310,23 @@ def test_a_set_may_lie_in_the_folder_of_the_pictures_that_it_is_made_of(tmp_path
     spec = DatasetSpec(videos=(str(tmp_path),), frames=2, slowdown=4, count=1)
     made = write_dataset(tmp_path / "set", spec)
     assert write_dataset(tmp_path / "set", spec, resume=True) == made
+
+
+def test_pictures_without_times_have_those_of_the_rate_that_is_said(tmp_path: Path) -> None:
+    for k, frame in enumerate(open_source("synthetic:moving-edge,size=32x24,fps=30,duration_s=1.2").frames()):
+        path = tmp_path / "pictures" / f"{k:03d}.png"
+        path.parent.mkdir(exist_ok=True)
+        write_codes(path, (255 * frame.light).astype(np.uint8))
+    asked = ["--from", path.parent, "--count", 1, "--jobs", 1, "--slowdown", 4]
+    refused = run(tmp_path / "set", *asked)
+    assert "images without times; give --fps, or put a timestamps.txt" in str(refused.exception)
+    result = run(tmp_path / "set", *asked, "--fps", "30000/1001", "--json")
+    assert result.exit_code == 0, result.output
+    (name,) = json.loads(result.output)["of_scenes"]
+    manifest = json.loads((tmp_path / "set" / name / "manifest.json").read_text())
+    assert float(Fraction(manifest["source"]["fps"])) == pytest.approx(30000 / 1001)
+    again = run(tmp_path / "set", *asked, "--fps", 25, "--resume")
+    assert "is another data set (spec.fps = " in str(again.exception)
 
 
 def test_who_is_asked_to_end_while_it_begins_lets_others_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -381,7 +400,14 @@ def test_scenes_that_cannot_be_made_are_named(tmp_path: Path, monkeypatch: pytes
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--slowdown", "4"], ["--size", "large"], ["--size", "8x8"], ["--from", "nowhere.mp4"], ["--count", "0"]],
+    [
+        ["--slowdown", "4"],
+        ["--fps", "4"],
+        ["--size", "large"],
+        ["--size", "8x8"],
+        ["--from", "nowhere.mp4"],
+        ["--count", "0"],
+    ],
 )
 def test_what_cannot_be_meant_is_one_sentence_and_exit_code_2(tmp_path: Path, arguments: list[str]) -> None:
     result = run(tmp_path / "set", *arguments)
@@ -394,6 +420,7 @@ def test_what_cannot_be_meant_is_one_sentence_and_exit_code_2(tmp_path: Path, ar
     ("arguments", "said"),
     [
         (["--size", "1000000x480"], "--size 1000000: it must be less than or equal to 65535"),
+        (["--fps", "1e10", "--from"], "--fps 10000000000.0: it must be less than or equal to 1000000000"),
         (["--slowdown", "5000", "--from"], "--slowdown 5000.0: it must be less than or equal to 1000"),
         (["--slowdown", "1e-9", "--from"], "--slowdown 1e-09: it must be greater than or equal to 0.000001"),
     ],
