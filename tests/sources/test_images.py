@@ -159,6 +159,7 @@ def test_other_files_in_the_folder_do_not_matter(tmp_path: Path) -> None:
         (["b/0.png", "c/notes.md"], r"the videos or folders of images in it, such as .*/b$"),
         (["b/manifest.json", "a/manifest.json", "README.md"], r"the recordings in it, such as .*/a$"),
         (["b/c/manifest.json", "notes.md"], r"expected \.png, "),
+        (["b/2/0.png", "a/c/3/0.png", "a/1.txt"], r"the folders of clips in it, such as .*/b$"),
     ],
 )
 def test_a_folder_of_sources_or_recordings_says_which_could_be_given(
@@ -185,7 +186,7 @@ def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--fps"):
         open_source(tmp_path)
     (tmp_path / "timestamps.txt").write_text("0\n33\n66\n")
-    with pytest.raises(DataError, match="3 times for 2 images"):
+    with pytest.raises(DataError, match=r"3 times for 2 images; .*, or give --fps"):
         open_source(tmp_path)
 
 

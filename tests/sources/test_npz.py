@@ -72,7 +72,7 @@ def test_which_array(tmp_path: Path) -> None:
 def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--fps"):
         open_source(saved(tmp_path, frames=STACK))
-    with pytest.raises(DataError, match="3 times for 5 frames"):
+    with pytest.raises(DataError, match="3 times for 5 frames; expected one each, or give --fps"):
         open_source(saved(tmp_path, frames=STACK, t=np.zeros(3)))
     with pytest.raises(DataError, match="ascontiguousarray"):
         open_source(saved(tmp_path, frames=np.asfortranarray(STACK)), fps=1)

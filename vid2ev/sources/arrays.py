@@ -113,7 +113,7 @@ class ArrayStack:
             self._stamps, self._unit = stamps_of_array(times, self.path, unit)
             if len(self._stamps) != count:
                 found, frames = counted(len(self._stamps), "time"), counted(count, "frame")
-                raise DataError(f"{self.path}: {found} for {frames}; expected one each")
+                raise DataError(f"{self.path}: {found} for {frames}; expected one each, or give --fps")
         elif isinstance(self._stack, NpzStack) and self._stack.fps is not None:
             self._fps = parse_fps(self._stack.fps)
         else:

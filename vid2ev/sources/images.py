@@ -166,7 +166,7 @@ class Images:
         stamps, unit = read_timestamps(file, [place.name for place, _ in self._places])
         if len(stamps) != len(self._places):
             found, images = counted(len(stamps), "time"), counted(len(self._places), "image")
-            raise DataError(f"{file}: {found} for {images}; expected one per image")
+            raise DataError(f"{file}: {found} for {images}; expected one per image; leave some out, or give --fps")
         return stamps, unit
 
 
@@ -204,10 +204,12 @@ def _instead(folder: Path) -> str:
     """What to give in place of a folder without pictures."""
     held = [Path(source) for source in sources_in(str(folder))] if folder.is_dir() else []
     held = [path for path in held if path != folder][:1]
+    below = (path for path in sorted(folder.glob("*/")) if sources_in(str(path)) != [str(path)])
     events = any(path.is_file() and recognise(path) for path in held)
     for kind, first in (
         ("event files" if events else "videos or folders of images", next(iter(held), None)),
         ("recordings", next((path.parent for path in sorted(folder.glob("*/manifest.json"))), None)),
+        ("folders of clips", next(below, None)),
     ):
         if first is not None:
             return f"give one of the {kind} in it, such as {first}"

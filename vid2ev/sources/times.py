@@ -140,7 +140,7 @@ def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
     stamps, unit = read_timestamp_array(file) if file.suffix == ".npy" else read_timestamps(file)
     if len(stamps) != frames:
         found = counted(len(stamps), "time")
-        raise DataError(f"{path}: {found} beside it for {counted(frames, 'frame')}; expected one each")
+        raise DataError(f"{path}: {found} beside it for {counted(frames, 'frame')}; expected one each, or give --fps")
     return stamps, unit
 
 
