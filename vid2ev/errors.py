@@ -72,9 +72,11 @@ def plain(text: str) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """A hint at the one of the words that may have been meant, to go on a sentence with; empty if none is near."""
-    close = difflib.get_close_matches(word, list(words), n=1)
-    return f" (did you mean {close[0]}?)" if close else ""
+    """A hint at the one of the words that may have been meant, to go on a sentence with, however it is written in
+    capitals; empty if none is near."""
+    by_letters = {each.casefold(): each for each in words}
+    close = difflib.get_close_matches(word.casefold(), list(by_letters), n=1)
+    return f" (did you mean {by_letters[close[0]]}?)" if close else ""
 
 
 def check_names(names: Iterable[str], known: Sequence[str]) -> None:

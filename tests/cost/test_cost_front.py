@@ -151,6 +151,12 @@ def test_frames_alone_are_judged_by_their_own_error() -> None:
     assert math.isfinite(rows[0].time)
 
 
+def test_a_limit_that_is_written_in_other_letters_is_named() -> None:
+    for said, meant in (("vr=0.05", "vR"), ("VR=0.05", "vR"), ("Time=3x", "time"), ("coun=0.01", "count")):
+        with pytest.raises(UsageError, match=rf"\(did you mean {meant}\?\)$"):
+            Budget.parse(said)
+
+
 @pytest.mark.parametrize(("budget", "kinds"), [("lsb=1", ["dvs"]), ("vR=0.1", ["cis"]), ("time=9x,us=3", ["cis"])])
 def test_errors_of_cameras_that_are_not_there_are_refused_at_once(budget: str, kinds: list[str]) -> None:
     with pytest.raises(UsageError, match="cannot be measured here"):
