@@ -155,6 +155,7 @@ def test_sensor_files_are_found_beside_the_rig(tmp_path: Path, monkeypatch: pyte
         ("[[camera]]\nname = 'a'", "camera 'a': kind is missing (dvs: events; cis: frames)"),
         ("[[camera]]\nname = 'a'\nkind = 'dvx'", "camera 'a': kind = 'dvx' is impossible: it must be 'dvs' or 'cis'"),
         (f"{CAMERA}translation_m = [0, 0, 1]", "'translation_m' is unknown (did you mean translation_mm?)"),
+        (f"{CAMERA}threshold_on = 0.2", "; of its sensor they are KEYs in set = { KEY = VALUE }"),
         (f"{CAMERA}size = [0, 480]", "size = [0, 480] is impossible: it must be greater than or equal to 1"),
         (f"{CAMERA}size = [640]", "size = [640] is impossible: it has too few values (width and height [px]"),
         (f"{CAMERA}size = [1, 2, 3]", "size = [1, 2, 3] is impossible: it has too many values"),

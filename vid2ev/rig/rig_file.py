@@ -175,7 +175,8 @@ def _complaint(error: ValidationError, model: type[BaseModel], values: Mapping[s
     key = str(first["loc"][0])
     if first["type"] == "extra_forbidden":
         keys = model.model_fields
-        return f"{where}: '{key}' is unknown{nearest(key, keys)}; the keys are {', '.join(keys)}"
+        of_sensor = "; of its sensor they are KEYs in set = { KEY = VALUE }" if "set" in keys else ""
+        return f"{where}: '{key}' is unknown{nearest(key, keys)}; the keys are {', '.join(keys)}{of_sensor}"
     meaning = model.model_fields[key].description
     if first["type"] == "missing" and len(first["loc"]) == 1:
         return f"{where}: {key} is missing ({meaning})"
