@@ -133,7 +133,7 @@ def of_weights(
         return OfFrames(name, network, network.spec.takes_events, running)
     if isinstance(network, EventFed):
         return OfEvents(name, network, running)
-    raise UsageError(f"{path} holds a network that rebuilds no frames in between; give one of frames or of events")
+    raise UsageError(f"{path} holds a network that rebuilds no frames in between; give others, as rrin_light-tiny")
 
 
 def _at_once(gap: Gap) -> int:
