@@ -621,6 +621,12 @@ def test_where_there_is_no_home_what_draws_plots_does_not_complain(monkeypatch: 
     assert not logging.getLogger("matplotlib.font_manager").isEnabledFor(logging.WARNING)
 
 
+def test_a_path_of_very_many_folders_is_refused() -> None:
+    deep = "/".join("d" * 1000)
+    for words in (("convert", CLIP, "-o", deep), ("reformat", "events.h5", deep), ("scene", "room", f"-o{deep}")):
+        refused(2, "999 folders deep, expected at most 400; go there first, with cd", *words)
+
+
 def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vid2ev.seen.recipe.open_source", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
@@ -637,6 +643,20 @@ def no_room_for_a_tensor() -> None:
 
 def no_room_on_a_gpu() -> None:
     raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.\nGPU 0 has ...")
+
+
+@pytest.mark.parametrize("said", [
+    "Caught RuntimeError in DataLoader worker process 0.\nOriginal Traceback:\nRuntimeError: unable to allocate shared"
+    " memory(shm) for file </torch_2557_2702163848_0>: No space left on device (28)",
+    "DataLoader worker (pid 7) is killed by signal: Bus error. It is possible that dataloader's workers are out of"
+    " shared memory. Please try to raise your shared memory limit.",
+])  # fmt: skip
+def test_shared_memory_that_is_full_is_one_sentence(monkeypatch: pytest.MonkeyPatch, said: str) -> None:
+    def fills(*_: Any, **__: Any) -> None:
+        raise RuntimeError(said)
+
+    monkeypatch.setattr("vid2ev.seen.recipe.open_source", fills)
+    refused(1, "shared memory (/dev/shm) is full; give it more room, or take --workers 0", "convert", CLIP)
 
 
 @pytest.mark.parametrize(("fills", "said"), [

@@ -21,10 +21,12 @@ from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.interrupts import never_lost
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+DEEPEST = 400  # folders in a path
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
 KEPT = "what is done is kept, the same command with --resume goes on"
 NOT_KEPT = "nothing is left behind"
 GPU_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
+SHARED_FULL = "shared memory (/dev/shm) is full; give it more room, or take --workers 0"
 MEMORY_FULL = "the memory is full; take smaller frames, tiles or batches, or fewer workers"
 
 
@@ -46,6 +48,7 @@ class Commands(click.Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         refuse_nothing(args)
+        refuse_depths(args)
         refuse_standard_output(args)
         names = self.list_commands(ctx)
         if args and args[0] not in names and not args[0].startswith("-"):
@@ -115,6 +118,8 @@ def what_is_full(error: Exception) -> str | None:
     if type(error).__name__ == "OutOfMemoryError":
         return GPU_FULL
     said = str(error)
+    if "unable to allocate shared memory" in said or "out of shared memory" in said:
+        return SHARED_FULL
     theirs = "DefaultCPUAllocator: can't allocate memory" in said or "Insufficient memory" in said
     return MEMORY_FULL if isinstance(error, MemoryError) or theirs else None
 
@@ -124,6 +129,13 @@ def refuse_nothing(words: list[str]) -> None:
     for before, word in pairwise(["vid2ev", *words]):
         if word == "" or (word.startswith("--") and word.endswith("=")):
             raise UsageError(f"nothing after '{word or before}': expected a value; a shell's variable may be empty")
+
+
+def refuse_depths(words: list[str]) -> None:
+    """Raise UsageError for a path of very many folders, which Python makes one within the call for another."""
+    for word in words:
+        if (folders := word.count("/")) > DEEPEST:
+            raise UsageError(f"{word}: {folders} folders deep, expected at most {DEEPEST}; go there first, with cd")
 
 
 def refuse_standard_output(words: list[str]) -> None:
