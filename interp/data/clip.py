@@ -16,6 +16,7 @@ import numpy as np
 from interp.representation.event_counts import MOST_NATS
 from vid2ev.errors import DataError
 from vid2ev.recording.disk import write_npy
+from vid2ev.requests import is_whole
 from vid2ev.untrusted import first_line, json_of
 
 HALF_WRITTEN = re.compile(r"\d+\.npy\.[0-9a-f]{16}\.new")  # by `write_clip`
@@ -52,6 +53,12 @@ class Clip:
     def coarser(self) -> int:
         """Pixels of the frames per pixel of the event camera, across."""
         return self.truth.shape[2] // self.off_on.shape[3]
+
+    @property
+    def footprint(self) -> int:
+        """Pixels of the frames, across, that a pixel of the event camera looked at: more where events were carried from
+        larger ones into the geometry of the frames."""
+        return int(self.about.get("footprint", self.coarser))
 
 
 def write_clip(path: Path, clip: Clip) -> None:
@@ -122,6 +129,8 @@ def _check(clip: Clip) -> None:
     alike = keys.shape == (2, *truth.shape[1:]) and truth.shape[3] == 3 and len(truth) > 1 and len(off_on) == 2
     if not alike or off_on.shape[3] > truth.shape[2] or clip.gap_us <= 0 or not isinstance(clip.about, dict):
         raise ValueError(f"{list(truth.shape)}, {list(keys.shape)}, {list(off_on.shape)}, {clip.gap_us} us")
+    if not is_whole(clip.about.get("footprint", 1), 1):
+        raise ValueError(f"footprint {clip.about['footprint']}")
     if not (_finite(truth) and _finite(off_on)):
         raise ValueError("values that are no numbers")
     if len(clip.contrast) != 2 or not all(0 < value <= MOST_NATS for value in clip.contrast):

@@ -79,7 +79,7 @@ def clip_of(
         counted = over(events_between(sequence, keys, times_us, bins), sequence.size[::-1], (rows, columns))
     off, on = sequence.contrast or counted.contrast[0].tolist()  # (those that are known, to the last bit)
     about = {"source": "recording", "name": sequence.name, "first": first, "part": [left, top, width, height]}
-    about |= {"coarser": coarser}
+    about |= {"coarser": coarser, "footprint": max(coarser, counted.footprint)}
     truth, keys = (in_srgb(codes, sequence.curve) for codes in (truth, keys[:, rows, columns]))
     return Clip(truth, keys, kept_counts(counted), (off, on), times_us[1] - times_us[0], about)
 

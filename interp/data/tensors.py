@@ -22,7 +22,7 @@ def tensors(clip: Clip, settings: ClipSettings) -> Sample:
     return {
         "frames": as_tensor(clip.keys),
         "off_on": counts,
-        "footprint": torch.tensor(clip.coarser),
+        "footprint": torch.tensor(clip.footprint),
         "contrast": torch.tensor(clip.contrast, dtype=torch.float32),
     }
 

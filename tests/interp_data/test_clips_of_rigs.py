@@ -8,11 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from interp.data.clip import Clip
+from interp.data.clip import Clip, read_clip, write_clip
 from interp.data.layouts import open_sequence
 from interp.data.recorded import clip_of, coarser_by, recorded
 from interp.data.samples import check_fits
 from interp.data.settings import ClipSettings
+from interp.data.tensors import tensors
 from vid2ev import convert
 from vid2ev.recording.exposures import write_codes
 
@@ -24,6 +25,7 @@ HERE, UPSIDE_DOWN, BESIDE, UNEVEN = (
     "rotation_deg = [0, 0, 180]\ntranslation_mm = [15, 0, 0]",
     "size = [47, 35]",
 )
+COARSE = "size = [32, 24]"
 
 
 def filmed(folder: Path) -> Path:
@@ -69,6 +71,17 @@ def test_clips_have_their_events_where_the_frames_saw_the_change(tmp_path: Path,
     np.testing.assert_array_equal(there.keys, here.keys)
     assert there.off_on.shape == here.off_on.shape and there.contrast == here.contrast
     assert apart(there, here) <= most
+
+
+def test_clips_know_how_coarse_events_were_before_they_were_carried(tmp_path: Path) -> None:
+    """As `interpolate` does; of pixels that lie edge on edge it is how many counts there are."""
+    for k, (place, footprint, across) in enumerate(((COARSE, 2, 20), (f"{COARSE}\n{BESIDE}", 2, 40), (BESIDE, 1, 40))):
+        found = clip(taken(tmp_path / str(k), place))
+        assert (found.footprint, found.off_on.shape[-1]) == (footprint, across)
+        sample = tensors(found, ClipSettings(recordings=1, recording_folders=("somewhere",)))
+        assert int(sample["footprint"]) == footprint and sample["off_on"].shape[-1] == 40
+        write_clip(tmp_path / "clip.npy", found)
+        assert read_clip(tmp_path / "clip.npy").footprint == footprint
 
 
 def test_samples_of_rigs_need_no_multiple_of_coarse_pixels(tmp_path: Path) -> None:
