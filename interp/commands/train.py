@@ -240,24 +240,25 @@ def _videos_in(path: str) -> list[str]:
 def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
     """The job of a run that was begun, with what the command line says of it: whatever is not said is as it was begun.
 
-    What decides more than a number, such as settings and data, has to be said as a whole.
+    What decides more than a number, such as data, and settings of networks, has to be said as a whole.
     """
     from pydantic import ValidationError
 
-    from interp.train.job import Job
+    from interp.train.job import Job, by_part
     from interp.train.run_folder import begun_job
     from vid2ev.commands.progress import given
     from vid2ev.untrusted import first_line
 
-    said = given() & options.keys()
-    if said - SAYS.keys():
+    said, settings = given() & options.keys(), by_part(options["settings"])
+    if said - SAYS.keys() - {"settings"} or settings["network"]:
         return _job(options, starts)
     try:
         begun = Job(**begun_job(path))
         if not said:
             return begun
         asked, merged = _job(options, starts).model_dump(), begun.model_dump()
-        for part, name in map(SAYS.__getitem__, said):
+        set_ = [(part, name) for part, values in settings.items() for name in values]
+        for part, name in [*map(SAYS.__getitem__, said - {"settings"}), *set_]:
             of, to = (asked[part], merged[part]) if part else (asked, merged)
             to[name] = of[name]
         return Job(**merged)

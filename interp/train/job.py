@@ -104,7 +104,7 @@ class Job(BaseModel):
         starts     files of weights to begin with, by part (`starts.parsed`)
         Raises UsageError for what cannot be meant.
         """
-        asked = _by_part(settings)
+        asked = by_part(settings)
         if "size" in asked["network"]:
             said = asked["network"]["size"]
             raise UsageError(f"setting network.size = {said!r}: it is none of a network's settings; give --size")
@@ -166,7 +166,7 @@ def _clip_defaults(network: str, videos: Sequence[str], recordings: Sequence[str
     return chosen
 
 
-def _by_part(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
+def by_part(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
     """The values asked for, by what they are settings of."""
     parts: dict[str, dict[str, Any]] = {part: {} for part in PARTS}
     for text in settings:

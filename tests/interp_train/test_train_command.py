@@ -98,13 +98,19 @@ def test_a_run_that_is_finished_says_so_without_its_clips(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(
-    "said", [["--steps", "3"], ["--seed", "7"], ["--network", "rrin-events-guided"], ["--size", "tiny"]]
-)
+    "said",
+    [
+        ["--steps", "3"], ["--seed", "7"], ["--network", "rrin-events-guided"], ["--size", "tiny"],
+        ["--set", "batch=2", "--set", "processes=1"],
+    ],
+)  # fmt: skip
 def test_what_is_not_said_of_a_run_is_as_it_was_begun(said: list[str]) -> None:
     assert run(*FEW, "--seed", "7", "-o", "run", "--session", "0.001s").exit_code == 0
     for wrong, why in (("--steps", "recipe.steps = 3, not 4"), ("--seed", "recipe.seed = 7, not 4")):
         refused = run("-o", "run", "--resume", wrong, "4")
         assert refused.exit_code == 2 and f"was begun with {why}" in refused.output
+    refused = run("-o", "run", "--resume", "--set", "clips.bins=16")
+    assert refused.exit_code == 2 and "was begun with clips.bins = 32, not 16" in refused.output
     again = run("-o", "run", "--resume", *said, "--workers", "0", "--cpu")
     assert again.exit_code == 0 and again.output.startswith("run: step 3 of 3"), again.output
 
@@ -375,16 +381,19 @@ def test_a_film_that_is_too_small_is_refused_before_training(tmp_path: Path) -> 
     assert shown.exit_code == 2 and "film.npz: 40x24 pixels; expected at least 128x128" in shown.output
 
 
-@pytest.mark.parametrize("command", [["train", "--dry-run", "--data"], ["dataset", "set", "--from"]])
+@pytest.mark.parametrize(("command", "option"), [
+    (["train", "--dry-run", "--data"], "--set clips.fps=RATE"), (["dataset", "set", "--from"], "--fps"),
+])  # fmt: skip
 @pytest.mark.parametrize("stack", [False, True])
-def test_pictures_without_times_are_told_of_what_there_is_here(tmp_path: Path, command: list[str], stack: bool) -> None:
-    """Not of --fps, which `convert` and `eval` have."""
+def test_pictures_without_times_are_told_of_what_there_is_here(
+    tmp_path: Path, command: list[str], option: str, stack: bool
+) -> None:
     (tmp_path / "clip").mkdir()
     for k in range(3):
         write_codes(tmp_path / "clip" / f"{k}.png", np.zeros((24, 40, 3), np.uint8))
     np.savez(tmp_path / "clip.npz", frames=np.zeros((3, 24, 40), np.float32))
     shown = CliRunner().invoke(main, [*command, str(tmp_path / f"clip{'.npz' * stack}")])
-    assert shown.exit_code == 2 and "without times; put " in shown.output and "--fps" not in shown.output
+    assert shown.exit_code == 2 and f"without times; give {option}, or put " in shown.output
 
 
 @pytest.mark.parametrize("option", ["--data", "--validate"])
