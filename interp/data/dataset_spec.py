@@ -24,7 +24,7 @@ from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_senso
 from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
-from vid2ev.sources import begins_s, is_single_picture
+from vid2ev.sources import begins_s, is_single_picture, short_name
 from vid2ev.sources.cut import FASTEST, SLOWEST
 from vid2ev.sources.source import LARGEST
 from vid2ev.sources.times import SLOWEST_HZ
@@ -158,7 +158,7 @@ def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
         start_s = round(begin_s + part * length_s, 6)
         options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9)}
         options |= {"slowdown": spec.slowdown, "fps": spec.fps}
-        name = f"{Path(video).stem}-{place:03d}-{part:05d}"
+        name = f"{short_name(video)}-{place:03d}-{part:05d}"
         yield Scene(name, video, options | {"seed": int(chance(spec.seed, name).integers(1 << 62))})
 
 

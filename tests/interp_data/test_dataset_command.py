@@ -222,6 +222,13 @@ def test_the_card_calls_films_what_was_filmed(videos: tuple[str, ...], said: str
     assert (f"* {said} " in card and "Films have been exposed" in card) if said else "ilms" not in card
 
 
+def test_recordings_of_scenes_are_called_after_these() -> None:
+    """As those of `convert` are, by names that all systems have for folders."""
+    said = ("scene:flicker,size=32x24,scene.duration_s=1.0", "synthetic:moving-edge,size=32x24,fps=100,duration_s=1.0")
+    scenes, _ = scenes_of(DatasetSpec(videos=said, frames=2))
+    assert {scene.name.rpartition("-")[0] for scene in scenes} == {"flicker-000", "moving-edge-001"}
+
+
 def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene that cannot be made is left out; one that cannot be written is made when there is room again."""
     from interp.data import dataset as module
