@@ -16,7 +16,7 @@ from interp import pretrained
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, choice, choice_of_one, device_of
 from interp.interpolate.destination import kind_of, manifest_of, places_of
-from interp.interpolate.fill import Fill, Filled
+from interp.interpolate.fill import NO_EVENTS, Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_sequence import OfSequence
 from interp.interpolate.of_still import OfStill
@@ -266,10 +266,11 @@ def _are_even(gaps_us: list[int]) -> bool:
     return rounded or most_us <= UNEVEN * least_us
 
 
-def _brought(ready: Ready) -> list[str]:
-    """What becomes of events, if they are asked for, whose camera stands elsewhere or has another clock."""
+def _brought(ready: Ready, done: list[dict[str, Any]]) -> list[str]:
+    """What becomes of events, if they are asked for and some are known, whose camera stands elsewhere or has another
+    clock; `done` are the stretches, the last of which is no gap."""
     take, wanted = ready.take, ready.fill.events or ready.fill.method.needs_events
-    if not (wanted and isinstance(take, OfSequence)):
+    if not (wanted and isinstance(take, OfSequence)) or all(each["remark"] == NO_EVENTS for each in done[:-1]):
         return []
     said = ["its cameras stand apart: events are brought to where the frames saw the same change"] * take.apart
     if take.late_us:
@@ -306,7 +307,7 @@ def _result(shelf: Shelf, ready: Ready) -> dict[str, Any]:
         "gaps_s": named,
         "remarks": [
             *take.remarks,
-            *_brought(ready),
+            *_brought(ready, shelf.done),
             *_clipped(shelf, ready),
             *_unevenly(shelf, ready.grid),
             *shelf.remarks_on(take.size),

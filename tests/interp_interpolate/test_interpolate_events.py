@@ -20,7 +20,8 @@ from small_takes import SIZE, STEP_US, images, moving, recording, strange
 from interp.data.layouts import open_sequence
 from interp.interpolate.after import After
 from interp.interpolate.event_cursor import EventCursor
-from interp.interpolate.fill import FEWEST, MOST, steps_for
+from interp.interpolate.fill import FEWEST, MOST, NO_EVENTS, steps_for
+from interp.interpolate.of_sequence import OfSequence
 from interp.interpolate.take import Options, open_take
 from interp.interpolate.whole import frames, interpolate
 from interp.light import luminance, to_codes, to_light
@@ -497,7 +498,9 @@ def test_a_recording_that_cannot_be_interpolated_says_what_it_lacks(tmp_path: Pa
             interpolate(tmp_path / name, tmp_path / "out", multiple=2)
 
 
-def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_path: Path) -> None:
+def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rig = tmp_path / "rig.toml"
     cameras = [f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\n' for kind in ("dvs", "cis")]
     rig.write_text(cameras[0] + "translation_mm = [15, 0, 0]\nsize = [32, 24]\n" + cameras[1])
@@ -516,6 +519,9 @@ def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_pat
     np.testing.assert_allclose(look.where, np.stack([(moved + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5], -1), atol=1e-3)
     told = interpolate(tmp_path / "apart", tmp_path / "flow", multiple=2, method="flow")
     assert not any("stand apart" in remark for remark in told["remarks"])  # (it asks for no events)
+    monkeypatch.setattr(OfSequence, "events", lambda *_: None)  # (as where their files are missing)
+    told = interpolate(tmp_path / "apart", tmp_path / "unknown", multiple=2)
+    assert NO_EVENTS in told["gaps_s"] and not any("stand apart" in remark for remark in told["remarks"])
 
 
 @pytest.mark.parametrize(("dvs_us", "cis_us"), [(0, 0), (700, 700), (1500, 0), (-200, 100)])
