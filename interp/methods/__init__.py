@@ -45,7 +45,7 @@ METHODS: dict[str, Callable[[], Method]] = {
     "both": lambda: ClosedForm("both", of_events(partial(bridge, method="both"))),
     "bridge": lambda: ClosedForm("bridge", of_events(bridge)),
     "ramps": lambda: ClosedForm("ramps", of_events(ramps)),
-    "guided": lambda: ClosedForm("guided", guided_by_ramps),
+    "guided": lambda: ClosedForm("guided", guided_by_ramps, in_tiles=True),
 }
 
 

@@ -31,12 +31,16 @@ Form = Callable[..., torch.Tensor]  # (frame_0, frame_1, events, times, highest=
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm(Together):
-    """A law that looks at one gap alone."""
+    """A law that looks at one gap alone.
+
+    in_tiles   whether its images are made in the tiles that are asked for: others are whole, or in strips of their own
+    """
 
     name: str
     law: Law
     needs_events: bool = True
     sequential: bool = False
+    in_tiles: bool = False
 
     def begin(self) -> Self:
         """Itself."""

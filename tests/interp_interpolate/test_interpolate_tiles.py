@@ -316,6 +316,25 @@ def test_motion_is_that_of_the_whole_however_frames_are_coded(
     torch.testing.assert_close(made, at_once, atol=1e-6, rtol=0)
 
 
+@pytest.mark.parametrize("name", METHODS)
+def test_a_method_has_tiles_where_it_is_made_in_them(name: str) -> None:
+    """What it makes in others is what it makes in these; what is no tiling is refused of all."""
+    method, asked = open_method(name), parse_tiling("96x96", SIZE, 2)
+    seen: set[int] = set()
+    cells = Tiling.cells
+
+    def counted(tiling: Tiling, *rest: Any) -> Any:
+        seen.add(len(tiling))
+        return cells(tiling, *rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Tiling, "cells", counted)
+        method.between(gap(), TIMES, asked)
+    assert (len(tiling_of(method, SIZE, "96x96")) > 1) == (len(asked) in seen)
+    with pytest.raises(UsageError, match="expected none, auto, or WIDTHxHEIGHT"):
+        tiling_of(method, SIZE, "96")
+
+
 def test_a_tiling_says_what_it_is() -> None:
     assert parse_tiling("none", SIZE, 32).describe() == "none"
     assert parse_tiling("128x128", SIZE, 32).describe() == "6 tiles of 128x128"
