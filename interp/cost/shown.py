@@ -7,7 +7,7 @@ from typing import Any
 
 from interp.cost.measure import Rebuilding, Row
 from vid2ev.compare.plots import lettered, save
-from vid2ev.cost.plot import label, stairs
+from vid2ev.cost.plot import entitle, label, stairs
 from vid2ev.cost.table import columns
 from vid2ev.terminal import counted
 
@@ -73,8 +73,7 @@ def _frame(axes: Any, found: Rebuilding, rows: list[Row]) -> None:
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_xlabel(f"ms per frame of {width}x{height} ({found.device}, {counted(found.threads, 'thread')})")
     axes.set_ylabel("PSNR [dB]")
-    title = f"{Path(found.source).name}, x{found.multiple}"
-    axes.set_title(title, loc="left").set_parse_math(False)  # (names may have $ in them)
+    entitle(axes, f"{Path(found.source).name}, x{found.multiple}")
     axes.grid(alpha=0.25, which="major")
 
 

@@ -85,8 +85,7 @@ def _scale(axes: Any, cost: Cost, rows: list[Row]) -> None:
     events = any(row.errors.distance is not None for row in rows)
     axes.set_ylabel("distance from the reference, vR" if events else "error of frames [LSB]")
     axes.set_xlabel(f"time, in multiples of how long the clip is ({counted(cost.threads, 'thread')})")
-    title = f"{Path(cost.clip).name}, {'x'.join(map(str, cost.size))}"
-    axes.set_title(title, loc="left").set_parse_math(False)  # (names may have $ in them)
+    entitle(axes, f"{Path(cost.clip).name}, {'x'.join(map(str, cost.size))}")
     axes.grid(alpha=0.25, which="major")
     axes.axvline(cost.reference.time, color="#999999", linestyle=":", linewidth=1)
     axes.annotate(
@@ -112,6 +111,11 @@ def _draw_recommended(axes: Any, cost: Cost) -> None:
             [best.time], [_error(best)], s=190, facecolors="none", edgecolors="#e08a00", linewidths=2, zorder=4,
             label=label,
         )  # fmt: skip
+
+
+def entitle(axes: Any, title: str) -> None:
+    """A title as it is written, which may be of files with $ in their names."""
+    axes.set_title(title, loc="left").set_parse_math(False)
 
 
 def stairs(axes: Any, x: Sequence[float], y: Sequence[float]) -> None:
