@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vid2ev import Dvs, load_sensor
+from vid2ev import Dvs, load_sensor, upsample
 from vid2ev.errors import UsageError
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -44,6 +44,12 @@ def test_frames_of_the_source_pass_untouched(method: str, subframes) -> None:
     for frame in made[:-1]:
         assert frame.light.shape == a.light.shape and frame.light.dtype == np.float32
         assert np.isfinite(frame.light).all()
+
+
+def test_a_name_of_which_nothing_is_made_is_no_optical_flow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(upsample, "METHODS", (*METHODS, "cubic"))
+    with pytest.raises(NotImplementedError, match="cubic"):
+        make_upsampler("cubic")
 
 
 @pytest.mark.parametrize(("method", "subframes", "count"), [

@@ -64,7 +64,7 @@ class Numbers(NamedTuple):
     curve: Curve
     threshold_on: float
     threshold_off: float
-    mismatch: float  # [nat]
+    mismatch: float  # [nat]; above 0 pixels have thresholds of their own (`Planes.theta`), which it is in already
     crossing_noise: float  # [nat]
     refractory_ns: int
     frame_time: bool  # all events at the end of the interval

@@ -90,6 +90,8 @@ def make_upsampler(
         from vid2ev.upsample.linear import LinearUpsampling
 
         return LinearUpsampling(1 if subframes == "auto" else subframes, upload)
-    from vid2ev.upsample.flow import FlowUpsampling
+    if method == "flow":
+        from vid2ev.upsample.flow import FlowUpsampling
 
-    return FlowUpsampling(subframes, max_subframes, threshold, upload)
+        return FlowUpsampling(subframes, max_subframes, threshold, upload)
+    raise NotImplementedError(f"upsampling '{method}' is one of METHODS, and nothing is made of it here")
