@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from event_streams import events_of
 from matplotlib.figure import Figure
 
 from vid2ev.compare.comparison import compare
-from vid2ev.compare.plots import BARS, draw_timing
+from vid2ev.compare.plots import BARS, draw_map, draw_timing
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 24), (3, 2), (24, 1), (346, 260), (1280, 720)])
+def test_ticks_of_a_map_are_whole_pixels_with_room_for_their_numbers(size: tuple[int, int]) -> None:
+    figure = Figure(figsize=(6, 4))
+    axes = figure.add_subplot()
+    draw_map(figure, axes, compare(events_of([5, 9]), events_of([5]), size))
+    figure.draw_without_rendering()
+    for axis in (axes.xaxis, axes.yaxis):
+        seen = [each for each in axis.get_major_ticks() if axis.get_view_interval().min() <= each.get_loc()]
+        seen = [each for each in seen if each.get_loc() <= axis.get_view_interval().max()]
+        assert seen and all(float(each.get_loc()).is_integer() for each in seen)
+        boxes = [each.label1.get_window_extent() for each in seen]
+        assert not any(one.overlaps(other) for one, other in pairwise(boxes))
 
 
 @pytest.mark.parametrize("most_us", [0, 7, 50, 51, 75, 152, 1234, 4999])

@@ -22,7 +22,7 @@ def plot(comparison: Comparison, picture: Path) -> None:
 
     figure = Figure(figsize=(14, 9), layout="constrained")
     panels = figure.subplot_mosaic([["map", "timing"], ["time", "time"]], height_ratios=[2, 1])
-    _draw_map(figure, panels["map"], comparison)
+    draw_map(figure, panels["map"], comparison)
     draw_timing(panels["timing"], comparison)
     _draw_time(panels["time"], comparison)
     save(figure, picture)
@@ -44,12 +44,17 @@ def save(figure: Any, picture: Path) -> None:
             figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
 
 
-def _draw_map(figure: Any, axes: Any, comparison: Comparison) -> None:
+def draw_map(figure: Any, axes: Any, comparison: Comparison) -> None:
+    """Draw how many more events each pixel has than that of the reference."""
+    from matplotlib.ticker import MaxNLocator
+
     difference = comparison.difference
     most = max(float(np.quantile(np.abs(difference), 0.999)), 1.0)
     image = axes.imshow(difference, cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest")
     figure.colorbar(image, ax=axes, shrink=0.7, label="events more (red) or fewer (blue) than the reference")
     axes.set_title("events per pixel", loc="left")
+    for axis in (axes.xaxis, axes.yaxis):  # (between pixels there is nothing to count, and little room where few are)
+        axis.set_major_locator(MaxNLocator(nbins=5, integer=True, min_n_ticks=1))
 
 
 def draw_timing(axes: Any, comparison: Comparison) -> None:
