@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,7 +118,8 @@ def train(
     machines.check_batch(job.recipe.batch)
     check_samples(job)
     films = job.validation.videos
-    notes = [f"not used: {reason}" for reason in unusable(job.clips, films)] + trained_with(job.clips, films)
+    notes = [f"not used: {reason}" for reason in (*unusable(job.clips, films), *_beside(options["data"]))]
+    notes += trained_with(job.clips, films)
     _note(notes, machines, quiet)
     device = _device(clips_on, machines, quiet)
     if dry_run:
@@ -235,6 +236,19 @@ def _videos_in(path: str) -> list[str]:
     if holds_sequences(folder):
         return []
     return [each for each in sources_in(path) if each != path or holds_pictures(folder)]
+
+
+def _beside(paths: Sequence[str]) -> Iterator[str]:
+    """The videos beside recordings in a folder, which is one of these."""
+    from interp.data.layouts import holds_sequences, is_sequence
+    from vid2ev.sources.many import sources_in
+    from vid2ev.terminal import counted
+
+    for path in paths:
+        folder = Path(path)
+        films = sources_in(path) if not is_sequence(folder) and holds_sequences(folder) else []
+        if films and films != [path]:
+            yield f"{path}: {counted(len(films), 'video')} beside its recordings; give --data {films[0]}, too"
 
 
 def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:

@@ -369,6 +369,11 @@ def test_a_folder_of_videos_or_of_pictures_is_as_these_by_themselves(tmp_path: P
         assert of["recording_folders"] == ([] if videos else [asked])
         if videos:
             assert json.loads(run(*small, "--validate", asked).output)["validation"]["videos"] == videos
+    np.savez(tmp_path / "recordings" / "a.npz", frames=light, fps=30)
+    both = run(*small[:1], *small[2:], "--data", "recordings")
+    said = f"note: not used: recordings: 1 video beside its recordings; give --data {Path('recordings', 'a.npz')}, too"
+    assert both.exit_code == 0 and said in both.output, both.output
+    Path("recordings/a.npz").unlink()
     assert "nothing: no recordings in it" in run(*small, "--data", "nothing").output
     for asked in ("nothing", "recordings"):
         refused = run(*small, "--validate", asked)
