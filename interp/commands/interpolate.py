@@ -80,10 +80,12 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @device_option
 @click.option(
     "--precision", type=click.Choice(["float32", "bfloat16", "float16"]), default="float32", show_default=True,
-    help="Of a network's convolutions: fewer bits are faster where hardware has them; `vid2ev cost SOURCE --rebuild 8`"
-    " says what that does here.",
+    help="Of a network's convolutions, but not of HDR's: fewer bits are faster where hardware has them; `vid2ev cost"
+    " SOURCE --rebuild 8` says what that does here.",
 )  # fmt: skip
-@click.option("--compile", "compiled", is_flag=True, help="Have torch compile a network first, for long footage.")
+@click.option(
+    "--compile", "compiled", is_flag=True, help="Have torch compile a network first, for long footage; not that of HDR."
+)
 @worker_options("Sources")
 @run_options
 def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
