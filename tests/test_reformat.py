@@ -12,11 +12,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from vid2ev import Events, UsageError, read_events
+from vid2ev import Events, UsageError, convert, read_events
 from vid2ev.commands import main
 from vid2ev.formats import FORMATS, describe_events, format_named, open_events, survey
 from vid2ev.formats.event_file import Picture, Recording
@@ -81,6 +82,23 @@ def test_what_a_format_does_not_hold_is_said(recording: Path, name: str) -> None
     assert ("labels" in warnings) == (not file.labelled)
     assert ("frame times" in warnings) == (getattr(file, "frame_us", None) is None)
     assert ("hold the size, 320x240" in warnings) == (file.size is None)
+
+
+@pytest.mark.parametrize("name", ["aedat4", "evt3", "csv"])
+def test_times_of_frames_that_stand_beside_a_recordings_file_come_along(tmp_path: Path, name: str) -> None:
+    """As if it had been converted into HDF5 at once; of a part those of its time."""
+    options = {"upsample": "none", "preview": False, "threads": 1}
+    clip = "synthetic:moving-edge,size=32x24,fps=50,duration_s=0.2"
+    for kind in ("hdf5", name):
+        convert(clip, tmp_path / kind, formats=[kind], **options)
+    reformat(tmp_path / name, tmp_path / "again.h5")
+    one, other = (open_events(path) for path in (tmp_path / "hdf5", tmp_path / "again.h5"))
+    np.testing.assert_array_equal(one.frame_us, other.frame_us)  # type: ignore[attr-defined]
+    with h5py.File(tmp_path / "hdf5" / "events.h5") as file, h5py.File(tmp_path / "again.h5") as again:
+        np.testing.assert_array_equal(file["frames/to_idx"], again["frames/to_idx"])
+    reformat(tmp_path / name, tmp_path / "part.h5", start_s=0.05, stop_s=0.15)
+    part = open_events(tmp_path / "part.h5").frame_us  # type: ignore[attr-defined]
+    assert part.tolist() == [60_000, 80_000, 100_000, 120_000, 140_000]
 
 
 def test_the_suffix_says_the_format() -> None:

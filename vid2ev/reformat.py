@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import (
     FORMATS,
@@ -21,6 +23,7 @@ from vid2ev.formats import (
     survey,
 )
 from vid2ev.formats.event_file import Format, Recording
+from vid2ev.formats.frame_index import frame_times_beside
 from vid2ev.recording.destination import check_place
 from vid2ev.recording.disk import sync, writing
 from vid2ev.recording.held import Held, undisturbed
@@ -64,7 +67,11 @@ def reformat(
     if target.exists() and not overwrite:
         raise UsageError(f"{target} exists; --overwrite replaces it")
     file = open_events(of_only_camera(source))
-    recording = survey(file) if start_s is None and stop_s is None else _part(file, start_s, stop_s)
+    frame_us = frame_times_beside(file.path) if "frame times" in kind.keeps else None
+    if start_s is None and stop_s is None:
+        recording = _framed(survey(file), frame_us)
+    else:
+        recording = _part(file, start_s, stop_s, frame_us)
     check_holds(kind, recording.size, recording.duration_us, recording.start_us)
     seen_us: list[int] = []
     made = _write(target, kind, _reported(recording, report, seen_us), overwrite)
@@ -113,7 +120,15 @@ def format_of_suffix(path: Path) -> Format:
     raise UsageError(f"{path}: '{path.suffix}' is the suffix of no format; give one of {', '.join(writable())}")
 
 
-def _part(file: Any, start_s: float | None, stop_s: float | None) -> Recording:
+def _framed(recording: Recording, frame_us: np.ndarray | None) -> Recording:
+    """A recording with the instants of its frames, where others say them and it does not itself."""
+    if recording.frame_us is not None or frame_us is None or not len(frame_us):
+        return recording
+    duration_us = max(recording.duration_us, int(frame_us[-1]) - recording.start_us)
+    return replace(recording, frame_us=frame_us, duration_us=duration_us)
+
+
+def _part(file: Any, start_s: float | None, stop_s: float | None, frame_us: np.ndarray | None) -> Recording:
     for t_s in (start_s or 0, stop_s or 0):
         if not abs(t_s) * 10**6 < LATEST_US:
             raise UsageError(f"part from {start_s or 0} s to {stop_s} s: expected seconds after the beginning")
@@ -122,7 +137,7 @@ def _part(file: Any, start_s: float | None, stop_s: float | None) -> Recording:
     stop_us = None if stop_s is None else first_us + round(1e6 * stop_s)
     if stop_us is not None and stop_us <= start_us:
         raise UsageError(f"stop {stop_s} s: expected a time after the start at {start_s or 0} s")
-    return window(file, start_us, stop_us)
+    return window(file, start_us, stop_us, frame_us=frame_us)
 
 
 def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) -> list[Path]:
