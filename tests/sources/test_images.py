@@ -137,6 +137,18 @@ def test_start_skips_without_changing_what_follows(tmp_path: Path) -> None:
     assert list(source.frames(9)) == []
 
 
+def test_pages_that_are_not_read_are_told_of(tmp_path: Path) -> None:
+    pages = [np.full((4, 5), code, np.uint8) for code in (10, 20)]
+    for name in ("0.tif", "1.tif"):
+        assert cv2.imwritemulti(str(tmp_path / name), pages)
+    source = open_source(tmp_path, fps=30)
+    assert source.warnings == ["0.tif has 2 pages; of images in a folder the first is read"]
+    assert len({float(frame.light.mean()) for frame in source.frames()}) == 1
+    assert not open_source(tmp_path / "0.tif", fps=30).warnings
+    cv2.imwrite(str(tmp_path / "0.tif"), pages[0])
+    assert not open_source(tmp_path, fps=30).warnings
+
+
 def test_float_tiff_is_light(tmp_path: Path) -> None:
     light = np.linspace(0, 12, 48, dtype=np.float32).reshape(6, 8)
     cv2.imwrite(str(tmp_path / "a.tiff"), light)

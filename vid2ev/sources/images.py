@@ -88,6 +88,9 @@ class Images:
             self.warnings += remarks_on_unit(self._unit, file)
         elif self.path.is_dir():
             self.warnings += _remarks_on_gaps([file for file, _ in self._places])
+        if self.path.is_dir() and (pages := pages_of(self._places[0][0])) > 1:
+            name = self._places[0][0].name
+            self.warnings.append(f"{name} has {pages} pages; of images in a folder the first is read")
         first, _, tagged = read_picture(*self._places[0])
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)
