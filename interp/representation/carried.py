@@ -136,7 +136,9 @@ def _seen(places: torch.Tensor, size: tuple[int, ...]) -> torch.Tensor:
 
 
 def _pixels_across(places: torch.Tensor, size: tuple[int, ...]) -> float:
-    """How many pixels of an event camera of a size a pixel of the frame is wide, in the middle of all."""
+    """How many pixels of an event camera of a size a pixel of the frame is wide, in the middle of all; of frames of one
+    column how high."""
+    places = places if places.shape[1] > 1 else places.transpose(0, 1)
     seen = _seen(places, size)
     across = (places[:, 1:] - places[:, :-1]).norm(dim=-1)[seen[:, 1:] & seen[:, :-1]]
     return float(across.median()) if len(across) else 1.0

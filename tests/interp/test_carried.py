@@ -64,6 +64,12 @@ def test_a_coarser_frame_takes_means() -> None:
     torch.testing.assert_close(over(some, (4, 6)).off_on, some.pooled(3).off_on)
 
 
+@pytest.mark.parametrize("size", [(4, 1), (1, 6), (4, 2)])
+def test_a_coarser_frame_of_one_row_or_column_takes_means_too(size: tuple[int, int]) -> None:
+    some = counts(1, (3 * size[0], 3 * size[1]))
+    torch.testing.assert_close(over(some, size).off_on, some.pooled(3).off_on)
+
+
 def by_the_book(plane: np.ndarray, places: np.ndarray) -> np.ndarray:
     """A plane of counts at places [H, W, 2] px: means over as many pixels as those of the frame are wide, in the middle
     of all, then between four of these; 0 beyond the sensor, and where a place is not known."""
