@@ -54,6 +54,13 @@ def test_a_folder_stands_for_what_is_in_it() -> None:
     assert many.sources_in("bare") == ["bare"]  # (which is refused in words)
 
 
+@pytest.mark.parametrize("name", ["a.mxf", "a.vob", "a.dv", "a.nut", "a.ivf", "a.h264", "a.apng", "a.MJPG", "a.mjpeg"])
+def test_a_folder_of_films_of_any_kind_is_no_folder_of_pictures(name: str) -> None:
+    Path("films").mkdir()
+    Path("films", name).touch()
+    assert many.sources_in("films") == [f"films/{name}"]
+
+
 def test_what_systems_put_beside_videos_is_none_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
     """Thumbnails, what macOS keeps of each file on disks of others, and what has gone astray, which nobody may read."""
     before = many.sources_in("clips")

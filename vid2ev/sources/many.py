@@ -7,14 +7,15 @@ from pathlib import Path
 
 from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
-from vid2ev.light.recognise import head_of, natural, pictures_in
+from vid2ev.light.recognise import MOTION_JPEG_SUFFIXES, head_of, natural, pictures_in
 from vid2ev.recording.manifest import is_recording
 from vid2ev.sources import is_live
 from vid2ev.untrusted import read_lines
 
 CLIPS = {
     ".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".y4m", ".ogv", ".3gp",
-    ".mts", ".m2ts", ".gif", ".npy", ".npz",
+    ".mts", ".m2ts", ".mxf", ".vob", ".asf", ".3g2", ".m2v", ".dv", ".ivf", ".nut", ".h264", ".h265", ".gif", ".apng",
+    *MOTION_JPEG_SUFFIXES, ".npy", ".npz",
 }  # fmt: skip
 ARRAYS = {".npy", ".npz"}
 
