@@ -380,10 +380,11 @@ def test_what_moves_in_an_avif_is_read_and_not_the_still_beside_it(tmp_path: Pat
     assert len(source.warnings) == (mode == "RGBA")
 
 
-def test_a_still_avif_is_a_single_picture(tmp_path: Path) -> None:
-    Image.fromarray(np.full((24, 32, 3), 30, np.uint8)).save(tmp_path / "a.avif")
+@pytest.mark.parametrize("name", ["a.avif", "a.qoi", "a.sgi", "a.pcx"])
+def test_pictures_that_only_ffmpeg_knows_say_what_can_be_done(tmp_path: Path, name: str) -> None:
+    Image.fromarray(np.full((24, 32, 3), 30, np.uint8)).save(tmp_path / name)
     with pytest.raises(UsageError, match="single picture, of a kind that is not read; make a PNG"):
-        open_source(tmp_path / "a.avif")
+        open_source(tmp_path / name)
 
 
 def test_motion_jpeg_goes_by_its_name(tmp_path: Path) -> None:

@@ -115,10 +115,8 @@ class VideoFile:
                     f"{self.path}: an animated WebP, of which this FFmpeg decodes nothing; make a video, an animated"
                     " PNG or a folder of pictures of it"
                 )
-            if container.format.name.endswith("_pipe"):
-                raise UsageError(f"{self.path}: a single picture; give the folder that holds the sequence")
-            stream = video_stream(container, self.name)
-            if _is_still(stream):
+            stream = None if container.format.name.endswith("_pipe") else video_stream(container, self.name)
+            if stream is None or _is_still(stream):  # (those that are read are no matter of FFmpeg's)
                 raise UsageError(f"{self.path}: a single picture, of a kind that is not read; make a PNG or TIFF of it")
             yield container, stream
 
