@@ -80,6 +80,28 @@ def test_a_process_that_is_killed_is_one_sentence() -> None:
         submit(os.kill, submit(os.getpid).result(), signal.SIGKILL).result()
 
 
+def test_processes_end_with_the_program_even_if_that_is_killed() -> None:
+    """At work and idle: both hold the program's output, and whoever reads that waits for them."""
+    program = """
+import os, time
+from vid2ev.cluster.processes import processes
+with processes(2) as submit:
+    work = "import os, time; os.write(1, b'begun' + bytes([10])); time.sleep({})"
+    done, at_work = (submit(exec, work.format(seconds)) for seconds in (1, 1000))
+    done.result()
+    print("idle", flush=True)
+    at_work.result()
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, start_new_session=True) as parent:
+        try:
+            assert parent.stdout and [parent.stdout.readline() for _ in range(3)] == [b"begun\n", b"begun\n", b"idle\n"]
+            parent.kill()
+            assert parent.communicate(timeout=60) == (b"", None)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(parent.pid, signal.SIGKILL)
+
+
 def test_a_task_that_fails_is_tried_again_but_not_one_that_cannot_be_meant(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -113,7 +113,7 @@ def test_what_compiles_for_later_ends_with_the_program_even_if_that_is_killed(tm
 def test_what_compiles_for_later_does_so_where_no_process_can_be_nice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr("os.nice")
     monkeypatch.setattr("signal.signal", lambda *_: None)
-    for name, instead in (("_end_with_parent", lambda: None), ("usual", lambda: ["a spec"]), ("see_something", id)):
+    for name, instead in (("end_with_parent", lambda: None), ("usual", lambda: ["a spec"]), ("see_something", id)):
         monkeypatch.setattr(f"vid2ev.gui.warming.{name}", instead)
     monkeypatch.setattr("vid2ev.gui.warming.flags_of", lambda spec, _: spec)
     ours, theirs = multiprocessing.Pipe()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
+from threading import Thread
 from typing import Any
 
 from vid2ev.cluster.deaf import born_deaf, hearing
@@ -38,8 +40,8 @@ def processes(count: int, begin: Callable[[], object] | None = None) -> Iterator
     """So many processes, each of which calls `begin` at first; what this yields gives them a task.
 
     Whatever goes wrong within ends it as soon as the tasks that are begun have ended, and Ctrl-C, which a terminal
-    sends to all processes and these leave to this one, at once: the others are dropped.  Raises DataError where one of
-    the processes is killed, or none can begin.
+    sends to all processes and these leave to this one, at once: the others are dropped.  They end where this one is
+    killed.  Raises DataError where one of them is killed, or none can begin.
     """
     others = active_children()
     # (processes that are not forked: threads of torch and numba do not survive it)
@@ -70,5 +72,19 @@ def processes(count: int, begin: Callable[[], object] | None = None) -> Iterator
 def _begun(begin: Callable[[], object] | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     hearing()
+    end_with_parent()
     if begin:
         begin()
+
+
+def end_with_parent() -> None:
+    """End at once when the program does that began this process, whatever ended it; what is half done is so as after a
+    kill."""
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -10,9 +10,9 @@ import multiprocessing
 import os
 import signal
 from multiprocessing.connection import Connection
-from threading import Thread
 from typing import Any
 
+from vid2ev.cluster.processes import end_with_parent
 from vid2ev.gui.stand_in import see_something, usual
 from vid2ev.kernels.layout import Flags
 from vid2ev.sensors.compiled import flags_of
@@ -66,7 +66,7 @@ class Warming:
 def _warm(pipe: Connection) -> None:
     """Compile the usual sensors."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()  # (what is compiled half is compiled another time)
     if hasattr(os, "nice"):  # (Windows has none)
         os.nice(19)
     for spec in usual():
@@ -75,11 +75,3 @@ def _warm(pipe: Connection) -> None:
             pipe.send(flags_of(spec, False))
         except OSError:
             return
-
-
-def _end_with_parent() -> None:
-    """End at once when the program does, whatever ended it; what is compiled half is compiled another time."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(0)
