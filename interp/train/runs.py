@@ -43,7 +43,8 @@ def run(
 
     machines    by default all GPUs of this one, or what the recipe says of those without
     session_s   seconds after which to stop, to go on another time
-    workers     processes that make samples, for each that trains; None for those cores that training leaves, at least 1
+    workers     processes that make samples, for each that trains; None for those cores that training leaves, at least
+                1; with 0 this one makes the first clips, too
     stop        asked after each step
     starts      files of weights to begin with, by part, as the job says; to go on the run has its own
     clips_on    the device that clips to train with are made on
@@ -71,7 +72,7 @@ def run(
         with ExitStack() as fed:
             try:
                 with counting(quiet, CLIPS) as report, _until(interrupted, report) as made:
-                    leads, jobs = machines.first, usable_cores()
+                    leads, jobs = machines.first, usable_cores() if spare else 1
                     feed = feed_of(job, folder.clips, step, spare, jobs, made, clips_on, leads, [path])
                 fed.callback(feed.close)
                 machines.check_clips(len(feed.validation))

@@ -83,6 +83,21 @@ def test_weights_that_were_removed_meanwhile_are_missed() -> None:
     assert run(*on).exit_code == 0 and Path("run/finished.json").exists()
 
 
+@pytest.mark.parametrize(("workers", "jobs"), [("0", 1), ("1", 3)])
+def test_without_workers_no_processes_make_the_first_clips(
+    monkeypatch: pytest.MonkeyPatch, workers: str, jobs: int
+) -> None:
+    asked: list[int] = []
+
+    def feed_of(job: Any, cache: Path, step: int, workers: int, jobs: int, *_: Any) -> Feed:
+        asked.append(jobs)
+        return Feed(Made(), clips(1), job.recipe.batch, 0)
+
+    monkeypatch.setattr(runs, "feed_of", feed_of)
+    monkeypatch.setattr(runs, "usable_cores", lambda: 3)
+    assert run(*FEW, "-o", "run", "--workers", workers).exit_code == 0 and asked == [jobs]
+
+
 def test_a_run_that_is_finished_says_so_without_its_clips(monkeypatch: pytest.MonkeyPatch) -> None:
     made = run(*FEW, "-o", "run", "--json")
     before = {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}
