@@ -40,7 +40,8 @@ def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: 
 
     The distance of events is van Rossum's at 1 ms: 0 for the same, 1 or more for nothing in common.  That of frames is
     the square of the greatest change of a level, as a share of what rounding to codes changes: 0.01 is 0.029 LSB.
-    Nothing is converted.
+    A level is what is rounded to a code, in the mean over the noise that stays; of dim light with shot noise codes may
+    change by more, as that noise goes with the light.  Nothing is converted.
     """
     from vid2ev.cores import usable_cores
     from vid2ev.plan.recordings import described, plans_of
