@@ -2,7 +2,8 @@
 
 A **level** is what the ADC rounds to a code [LSB], in the mean over all noise.  Rounding moves it by up to half an LSB;
 the mean square of that is 1/12 where levels are spread evenly.  Shot noise goes with the light: where that changes, so
-does the noise, and codes of few electrons change by more than their levels.  The distance of two films is, in these units,
+does the noise, and codes of few electrons change by more than their levels.  In units of that square the distance of
+two films is
 
     distance = 12 (max |change of a level|)^2         1: as much as rounding changes, in the mean
 
