@@ -669,6 +669,17 @@ def test_a_full_memory_is_one_sentence(monkeypatch: pytest.MonkeyPatch, fills: C
     assert result.stderr.count("\n") == 1
 
 
+def test_where_no_thread_can_begin_it_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise RuntimeError("can't start new thread")  # (as Python does, of a limit of memory or of processes)
+
+    monkeypatch.setattr("_thread.start_new_thread", none)
+    monkeypatch.setattr("threading._start_new_thread", none)
+    result = vid2ev("convert", CLIP, "--threads", "2")
+    assert result.exit_code == 1 and result.stderr.startswith("error: no thread can begin here")
+    assert result.stderr.count("\n") == 1
+
+
 def test_every_error_raised_on_purpose_has_its_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     @click.command()
     def failing() -> None:

@@ -28,6 +28,7 @@ NOT_KEPT = "nothing is left behind"
 GPU_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
 SHARED_FULL = "shared memory (/dev/shm) is full; give it more room, or take --workers 0"
 MEMORY_FULL = "the memory is full; take smaller frames, tiles or batches, or fewer workers"
+NO_THREAD = "no thread can begin here, for want of memory or as no more processes may run; raise these limits (ulimit)"
 
 
 def say_interrupted(remedy: str = "") -> NoReturn:
@@ -111,7 +112,7 @@ def as_told(error: Exception) -> Exception:
 
 
 def what_is_full(error: Exception) -> str | None:
-    """A sentence for an error that means that there is no more memory; None for all others.
+    """A sentence for an error that means that there is no more memory, or no more threads; None for all others.
 
     numpy, Python and FFmpeg raise MemoryError; torch and OpenCV errors of their own, which take a second to import.
     """
@@ -120,6 +121,8 @@ def what_is_full(error: Exception) -> str | None:
     said = str(error)
     if "unable to allocate shared memory" in said or "out of shared memory" in said:
         return SHARED_FULL
+    if said == "can't start new thread":  # (of Python, which does not know which of the two it is)
+        return NO_THREAD
     theirs = "DefaultCPUAllocator: can't allocate memory" in said or "Insufficient memory" in said
     return MEMORY_FULL if isinstance(error, MemoryError) or theirs else None
 
