@@ -96,7 +96,8 @@ class ClipSettings(BaseModel):
             raise ValueError("recordings without recording_folders: expected one or more")
         if self.recordings > 0 and self.light == "linear":
             raise ValueError(
-                "recordings have codes of 8 bits, where light beyond white is wanted: expected other clips than these"
+                "recordings have codes of 8 bits, where light beyond white is wanted: expected videos, pictures with"
+                " their times, or scenes"
             )
         if any(side % factor for side in self.size for factor in self.coarser) and self.rigs > 0:
             raise ValueError(f"size {self.size}: expected a multiple of {self.coarser} both ways, for coarser sensors")

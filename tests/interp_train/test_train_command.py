@@ -211,7 +211,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--set", 'clips.scene_names=["rom"]'], "scene 'rom'"),
         (["--dry-run", "--set", 'clips.textures=["cofee"]'], "texture 'cofee' (did you mean coffee?): no picture"),
         (["--dry-run", "--set", 'clips.environments=["sky.hdr"]'], "environment 'sky.hdr': no picture"),
-        (["--dry-run", "--network", "hdr", "--data", "."], "recordings have codes of 8 bits, where light"),
+        (["--dry-run", "--network", "hdr", "--data", "."], "beyond white is wanted: expected videos, pictures"),
         (["--dry-run", "--set", 'clips.light="linear"'], "clips.light = 'linear' for rrin_events_guided"),
         (
             ["--dry-run", "--network", "hdr", "--set", 'clips.light="srgb"'],
