@@ -8,6 +8,9 @@ that c_on lies anywhere within one threshold above it, as leak has it after a re
 without noise a scene that returns to its first value would sit exactly on a level.  So the first change of a clip that
 is less than a threshold sends ON events in its share of the pixels, and no OFF events.
 
+With `timing = "frame"` the signal stays as it is until the frame, where it jumps and all that is crossed is crossed at
+once; a blind time that ends before it leaves the memory at the signal of the frame before (`refractory = "track"`).
+
 Sources: the paper, section II.A (thresholds apart, the level updated at every potential crossing); timing `linear` is
 ESIM (Rebecq, Gehrig, Scaramuzza, CoRL 2018).
 """
