@@ -203,6 +203,7 @@ def _number(text: str | None, option: str) -> Any:
 
 
 def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
+    from interp.methods import METHODS
     from vid2ev.terminal import counted
 
     (width, height), kind = made["size"], made["format"].partition(" ")[0]
@@ -211,7 +212,8 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     facts.append(("from", f"{counted(made['key_frames'], 'key frame')}, {span_s:.6g} s"))
     if made["hdr"]:
         facts.append(("hdr", f"all frames, by {pretrained.name_of(Path(made['hdr']['weights']))}"))
-    if made["tiles"] != "none":
+    method = made["interpolation"]["method"]  # (of closed forms, most take no tiles)
+    if made["tiles"] != "none" and (made["hdr"] or method not in METHODS or getattr(METHODS[method](), "in_tiles", False)):
         facts.append(("tiles", made["tiles"]))
     for reason, gaps in made["gaps_s"].items():
         first = f", the first at {gaps[0][0]:.6g} s"

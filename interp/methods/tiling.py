@@ -159,8 +159,7 @@ def tiling_of(method: Method, size: tuple[int, int], tile: str = "auto", footpri
     """
     network: Any = getattr(method, "network", None)
     if network is None:
-        asked = parse_tiling(tile, size, 2)
-        return asked if getattr(method, "in_tiles", False) else undivided(*size)
+        return parse_tiling(tile, size, 2)
     guided = getattr(network.spec, "guided", False)
     return parse_tiling(tile, size, network.multiple, SEES_PX * footprint * guided)
 

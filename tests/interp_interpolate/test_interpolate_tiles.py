@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 import torch
+from click.testing import CliRunner
 from small_takes import images, moving
 from torch.nn import functional as F
 from torch.utils._python_dispatch import TorchDispatchMode
@@ -20,12 +21,14 @@ from interp.interpolate.after import After
 from interp.interpolate.whole import frames
 from interp.light import luminance, to_light
 from interp.methods import METHODS, Gap, closed_forms, of_networks, open_method, tiling
+from interp.methods.closed_forms import ClosedForm
 from interp.methods.of_networks import OfFrames
 from interp.methods.tiling import LEAST, Tiling, parse_tiling, part, tiling_of
 from interp.networks import make
 from interp.representation.carried import at_places, carried, footprint_over, over, places_over
 from interp.representation.event_counts import EventCounts
 from interp.weights import save
+from vid2ev.commands import main
 from vid2ev.errors import UsageError
 
 SIZE = (272, 208)  # width, height
@@ -318,8 +321,7 @@ def test_motion_is_that_of_the_whole_however_frames_are_coded(
 
 @pytest.mark.parametrize("name", METHODS)
 def test_a_method_has_tiles_where_it_is_made_in_them(name: str) -> None:
-    """What it makes in others is what it makes in these; what is no tiling is refused of all."""
-    method, asked = open_method(name), parse_tiling("96x96", SIZE, 2)
+    method, asked = METHODS[name](), parse_tiling("96x96", SIZE, 2)
     seen: set[int] = set()
     cells = Tiling.cells
 
@@ -330,9 +332,17 @@ def test_a_method_has_tiles_where_it_is_made_in_them(name: str) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Tiling, "cells", counted)
         method.between(gap(), TIMES, asked)
-    assert (len(tiling_of(method, SIZE, "96x96")) > 1) == (len(asked) in seen)
-    with pytest.raises(UsageError, match="expected none, auto, or WIDTHxHEIGHT"):
-        tiling_of(method, SIZE, "96")
+    assert isinstance(method, ClosedForm) and method.in_tiles == (len(asked) in seen)
+
+
+@pytest.mark.parametrize(("method", "told"), [("linear", False), ("flow", False), ("rrin_light-tiny", True)])
+def test_tiles_are_told_of_what_is_made_in_them(tmp_path: Path, method: str, told: bool) -> None:
+    source = images(tmp_path / "in", [frame.repeat(3, 0).repeat(3, 1) for frame in moving(2)])
+    by = "--network" if told else "--method"
+    said = CliRunner().invoke(
+        main, ["interpolate", str(source), by, method, "--tile", "64x64", "-o", str(tmp_path / "a")]
+    )
+    assert said.exit_code == 0 and (f"{'tiles':<10}" in said.output) == told, said.output
 
 
 def test_a_tiling_says_what_it_is() -> None:
