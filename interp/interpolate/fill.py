@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from fractions import Fraction
 from math import ceil
 from typing import Any, Protocol, runtime_checkable
 
@@ -74,7 +75,7 @@ class Work:
 class Fill:
     """Makes the frames of a take's stretches, which come in their order.
 
-    parts    into how many equal parts the grid divides gaps, if it does
+    multiple   how many frames the grid has to a key frame
     events   whether somebody else needs the events, too
     shot     how many cuts there were
     """
@@ -83,7 +84,7 @@ class Fill:
     method: Method
     fallback: Method
     tiling: Tiling
-    parts: int | None
+    multiple: Fraction
     device: torch.device | str = "cpu"
     events: bool = False
     shot: int = 0
@@ -151,19 +152,20 @@ class Fill:
         events = self.take.events(first.t_us, second.t_us)
         if events is None:
             return None
-        steps, dead_time = steps_for(self.parts), self.take.dead_time
+        steps, dead_time = steps_for(self.multiple), self.take.dead_time
         counts = count_events(events, size, first.t_us, second.t_us, steps, dead_time=dead_time).to(self.device)
         looks = self.take.looks((first.t_us + second.t_us) // 2)
         return calibrated(frames, counts, self.take.contrast, self.take.apart, looks)
 
 
-def steps_for(parts: int | None) -> int:
-    """In how many sub-intervals events are counted: so that frames lie at the ends of some, or of up to MOST of them as
-    many as do."""
-    if parts is None:
-        return 2 * FEWEST
+def steps_for(multiple: Fraction) -> int:
+    """In how many sub-intervals events are counted, of so many frames to a key frame: so that all frames lie at the
+    ends of some, or where that takes more than MOST and they are a whole number, as many as do."""
+    parts = multiple.numerator  # (frames lie at whole parts of so many: 2 and 4 fifths, then 1 and 3, of 5/2)
     if parts <= MOST:
         return parts * ceil(FEWEST / parts)
+    if multiple.denominator > 1:
+        return 2 * FEWEST
     return max((steps for steps in range(FEWEST, MOST + 1) if parts % steps == 0), default=MOST)
 
 

@@ -57,9 +57,8 @@ class Grid(Protocol):
     def count(self, gaps: int, span_us: int) -> int:
         """How many instants there are in so many gaps that last so long altogether."""
 
-    @property
-    def parts(self) -> int | None:
-        """Into how many equal parts all gaps are divided; None if that is no whole number."""
+    def multiple_of(self, key_hz: Fraction) -> Fraction:
+        """How many instants there are to a key frame, of which there are so many a second."""
 
     def describe(self) -> dict[str, str]:
         """For JSON."""
@@ -99,10 +98,9 @@ class Times:
         """See `Grid`."""
         return floor(gaps * self.multiple) + 1
 
-    @property
-    def parts(self) -> int | None:
+    def multiple_of(self, key_hz: Fraction) -> Fraction:
         """See `Grid`."""
-        return int(self.multiple) if self.multiple.denominator == 1 else None
+        return self.multiple
 
     def describe(self) -> dict[str, str]:
         """See `Grid`."""
@@ -133,10 +131,9 @@ class Rate:
         """See `Grid`."""
         return floor(self._number(span_us + SAME_US, 0)) + 1
 
-    @property
-    def parts(self) -> int | None:
+    def multiple_of(self, key_hz: Fraction) -> Fraction:
         """See `Grid`."""
-        return None
+        return self.rate_hz / key_hz
 
     def describe(self) -> dict[str, str]:
         """See `Grid`."""

@@ -186,7 +186,7 @@ def prepared(
     footprint = footprint_of(take.size, take.event_size) if take.event_size else 1
     tiling = tiling_of(chosen.method, take.size, tile, footprint)
     needed = after is not None and after.needs_events
-    fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, device, needed)
+    fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.multiple_of(take.rate), device, needed)
     return Ready(take, grid, fill, after, cuts == "hold", chosen.why, chosen.about)
 
 
@@ -267,12 +267,15 @@ def _are_even(gaps_us: list[int]) -> bool:
 
 
 def _brought(ready: Ready, done: list[dict[str, Any]]) -> list[str]:
-    """What becomes of events, if they are asked for and some are known, whose camera stands elsewhere or has another
-    clock; `done` are the stretches, the last of which is no gap."""
+    """What becomes of events, if they are asked for, whose camera stands elsewhere, if some are known, or has another
+    clock, by which they may be unknown; `done` are the stretches, the last of which is no gap."""
     take, wanted = ready.take, ready.fill.events or ready.fill.method.needs_events
-    if not (wanted and isinstance(take, OfSequence)) or all(each["remark"] == NO_EVENTS for each in done[:-1]):
+    if not (wanted and isinstance(take, OfSequence)):
         return []
-    said = ["its cameras stand apart: events are brought to where the frames saw the same change"] * take.apart
+    known = any(each["remark"] != NO_EVENTS for each in done[:-1])
+    said = ["its cameras stand apart: events are brought to where the frames saw the same change"] * (
+        take.apart and known
+    )
     if take.late_us:
         late = f"{abs(take.late_us)} us {'late' if take.late_us > 0 else 'early'}"
         said.append(

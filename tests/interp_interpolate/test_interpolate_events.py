@@ -6,6 +6,7 @@ import json
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +22,7 @@ from interp.data.layouts import open_sequence
 from interp.interpolate.after import After
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.fill import FEWEST, MOST, NO_EVENTS, steps_for
+from interp.interpolate.instants import Grid, Rate, Times
 from interp.interpolate.of_sequence import OfSequence
 from interp.interpolate.take import Options, open_take
 from interp.interpolate.whole import frames, interpolate
@@ -319,12 +321,28 @@ def test_a_file_that_states_no_beginning_knows_nothing_of_the_time_before_its_ev
 
 @pytest.mark.parametrize("parts", [1, 2, 7, 32, 33, 100, 128, 129, 160, 250, 256, 997, 5000])
 def test_frames_lie_at_the_ends_of_sub_intervals_or_of_as_many_as_can_be(parts: int) -> None:
-    steps = steps_for(parts)
+    steps = steps_for(Fraction(parts))
     assert FEWEST <= steps <= MOST
     if parts <= MOST:
         assert steps % parts == 0
     else:
         assert parts % steps == 0 or (steps == MOST and not any(parts % k == 0 for k in range(FEWEST, MOST)))
+
+
+@pytest.mark.parametrize(
+    "grid", [Times(Fraction(5, 2)), Times(Fraction(2, 3)), *(Rate(Fraction(k)) for k in (75, 90, 100))]
+)
+def test_frames_lie_at_the_ends_of_sub_intervals_where_they_are_no_whole_number_to_a_key_frame_too(grid: Grid) -> None:
+    """But for the microseconds that times of key frames are rounded to; where that takes very many they do not."""
+    key_hz = Fraction(30)
+    keys_us = [round(10**6 * k / key_hz) for k in range(8)]
+    steps = steps_for(grid.multiple_of(key_hz))
+    assert FEWEST <= steps <= MOST
+    for k, (start_us, stop_us) in enumerate(pairwise(keys_us)):
+        for instant in grid.between(k, start_us, stop_us, 0):
+            off_us = abs(steps * instant.share - round(steps * instant.share)) / steps * (stop_us - start_us)
+            assert off_us <= 2, (k, instant)
+    assert steps_for(Rate(Fraction("10.0001")).multiple_of(Fraction(10))) == 2 * FEWEST
 
 
 @pytest.mark.parametrize("related", [True, False])
