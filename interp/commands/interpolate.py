@@ -213,7 +213,8 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     if made["hdr"]:
         facts.append(("hdr", f"all frames, by {pretrained.name_of(Path(made['hdr']['weights']))}"))
     method = made["interpolation"]["method"]  # (of closed forms, most take no tiles)
-    if made["tiles"] != "none" and (made["hdr"] or method not in METHODS or getattr(METHODS[method](), "in_tiles", False)):
+    in_tiles = method not in METHODS or getattr(METHODS[method](), "in_tiles", False)
+    if made["tiles"] != "none" and (made["hdr"] or in_tiles):
         facts.append(("tiles", made["tiles"]))
     for reason, gaps in made["gaps_s"].items():
         first = f", the first at {gaps[0][0]:.6g} s"
