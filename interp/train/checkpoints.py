@@ -48,6 +48,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             stored = sum(info.file_size for info in archive.infolist())
             if stored > path.stat().st_size:
                 check_bytes(path, stored)
+            if damaged := archive.testzip():  # (torch does not ask: a flipped bit would be another weight)
+                raise zipfile.BadZipFile(f"Bad CRC-32 for file {damaged!r}")
         found = torch.load(path, map_location="cpu", weights_only=True)
     except DataError:
         raise

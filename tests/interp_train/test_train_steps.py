@@ -76,15 +76,19 @@ def test_a_checkpoint_is_whole_or_the_one_before(tmp_path: Path, monkeypatch: py
     assert [child.name for child in tmp_path.iterdir()] == ["checkpoint.ckpt"]
 
 
-def test_a_torn_checkpoint_is_refused_in_a_sentence(tmp_path: Path) -> None:
+def test_a_torn_or_damaged_checkpoint_is_refused_in_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "checkpoint.ckpt"
-    WholeFiles().save_checkpoint({"global_step": 1, "state_dict": {"a": torch.rand(1000)}}, path)
+    WholeFiles().save_checkpoint({"global_step": 1, "state_dict": {"a": torch.ones(1000)}}, path)
     whole = path.read_bytes()
     for length in (0, 1, 100, len(whole) // 2, len(whole) - 1):
         path.write_bytes(whole[:length])
         with pytest.raises(DataError, match=r"checkpoint\.ckpt is no whole checkpoint .*; copy the run again") as error:
             read_checkpoint(path)
         assert "\n" not in str(error.value)
+    middle = whole.index(torch.ones(1000).numpy().tobytes()) + 2000
+    path.write_bytes(whole[:middle] + bytes([whole[middle] ^ 4]) + whole[middle + 1 :])
+    with pytest.raises(DataError, match=r"is no whole checkpoint \(Bad CRC-32 for file .*\); copy the run again"):
+        read_checkpoint(path)
     torch.save({"weights": 1}, path)
     with pytest.raises(DataError, match="is no checkpoint of `vid2ev train`"):
         read_checkpoint(path)
