@@ -873,10 +873,11 @@ def test_numbers_have_three_digits_and_a_unit_without_powers_of_ten(digits: floa
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_full_standard_output_is_one_sentence(unbuffered: str) -> None:
+@pytest.mark.parametrize("asked", ["sensors", "--version", "--help"])
+def test_a_full_standard_output_is_one_sentence(asked: str, unbuffered: str) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "vid2ev", "sensors"],
+            [sys.executable, "-m", "vid2ev", asked],
             stdout=full, stderr=subprocess.PIPE, text=True, timeout=100,
             env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )  # fmt: skip

@@ -11,6 +11,8 @@ import errno
 import logging
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 from itertools import pairwise
 from typing import Any, NoReturn
@@ -58,32 +60,43 @@ class Commands(click.Group):
             raise click.UsageError(f"no command '{args[0]}'; {hint}", ctx)
         return super().resolve_command(ctx, args)
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As `invoke`: of help and the version, which are printed here."""
+        with said_in_a_sentence():
+            return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Errors meant for people become one line; what else goes wrong keeps its traceback."""
         logging.getLogger("matplotlib").setLevel(logging.ERROR)  # (it warns where there is no home to keep its letters)
-        try:
-            with never_lost():
-                return super().invoke(ctx)
-        except Vid2evError as error:
-            click.echo(f"error: {error}", err=True)
-            sys.exit(error.exit_code)
-        except OSError as error:
-            if error.filename is None and (error.errno not in NO_ROOM or not _printing_fails()):
-                raise  # (click ends quietly where nobody reads on)
-            if error.filename is None:
-                place = "standard output cannot be written"
-                click.echo(f"error: {place}: {error.strerror}; make room, or print to another place", err=True)
-                _print_nowhere()
-                sys.exit(DataError.exit_code)
-            click.echo(f"error: {as_told(error)}", err=True)
+        with said_in_a_sentence(), never_lost():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def said_in_a_sentence() -> Iterator[None]:
+    """Ends the program where errors are meant for people, with one line."""
+    try:
+        yield
+    except Vid2evError as error:
+        click.echo(f"error: {error}", err=True)
+        sys.exit(error.exit_code)
+    except OSError as error:
+        if error.filename is None and (error.errno not in NO_ROOM or not _printing_fails()):
+            raise  # (click ends quietly where nobody reads on)
+        if error.filename is None:
+            place = "standard output cannot be written"
+            click.echo(f"error: {place}: {error.strerror}; make room, or print to another place", err=True)
+            _print_nowhere()
             sys.exit(DataError.exit_code)
-        except Exception as error:
-            if (told := as_told(error)) is error:
-                raise
-            click.echo(f"error: {told}", err=True)
-            sys.exit(DataError.exit_code)
-        except KeyboardInterrupt:
-            say_interrupted()
+        click.echo(f"error: {as_told(error)}", err=True)
+        sys.exit(DataError.exit_code)
+    except Exception as error:
+        if (told := as_told(error)) is error:
+            raise
+        click.echo(f"error: {told}", err=True)
+        sys.exit(DataError.exit_code)
+    except KeyboardInterrupt:
+        say_interrupted()
 
 
 def _printing_fails() -> bool:
