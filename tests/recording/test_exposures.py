@@ -252,7 +252,7 @@ def test_fewer_times_than_a_checkpoint_knows_of_are_refused(tmp_path: Path) -> N
         at_work.add(exposure)
     times = tmp_path / "raw" / "timestamps.txt"
     times.write_text("".join(times.read_text().splitlines(keepends=True)[:2]))
-    with pytest.raises(DataError, match="holds 1 pictures with times, expected 3"):
+    with pytest.raises(DataError, match="holds 1 picture with times, expected 3"):
         files(tmp_path).keep(3)
 
 

@@ -222,6 +222,10 @@ lenses = st.sampled_from([SOURCE, BENT, FISHEYE])
     seed=225, values=[0.0] * 6, turn=(0.0, 1.5, 1.0), way=(0.96875, 0.0, 1.662109375), source=SOURCE, camera=SOURCE,
     size=(5, 9),
 )  # fmt: skip
+@example(  # (a border that is looked for along itself, all but 1e-310 of the way)
+    seed=0, values=[0.0] * 6, turn=(0.0, 67.0, 1.1125369292536007e-308), way=(0.0, 0.0, 0.0), source=SOURCE,
+    camera=SOURCE, size=(5, 9),
+)  # fmt: skip
 @given(
     seed=st.integers(0, 2**32 - 1),
     values=st.lists(numbers, min_size=6, max_size=6),

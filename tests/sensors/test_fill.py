@@ -189,7 +189,7 @@ def test_what_cannot_be_is_said() -> None:
     for threads in (0, -1, 1.5, "2"):
         with pytest.raises(UsageError, match=r"threads .*expected a whole number of at least 1"):
             DvsBatch([DvsSpec()] * 2, SIZE, [1, 2], threads=threads)  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="1 grids for 2 clips"):
+    with pytest.raises(UsageError, match="1 grid for 2 clips"):
         batch.fill([NetCounts(SIZE, [0, 1])], light, t_ns)
     with pytest.raises(UsageError, match="expected \\(frames, 2, 37, 61\\)"):
         batch.steps(light[:, :1], t_ns)

@@ -102,6 +102,6 @@ def _towards(directions: np.ndarray, source: Intrinsics) -> np.ndarray:
     length = np.linalg.norm(way, axis=1, keepdims=True)
     way = np.where(length > 0, way / np.where(length > 0, length, 1), (1.0, 0.0))
     centre, last = np.clip(source.centre_px, 0, np.array(source.size) - 1), np.array(source.size) - 1
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # (along an edge, nearly or quite: never there)
         far = np.where(way > 0, (last - centre) / way, np.where(way < 0, -centre / way, np.inf))
     return centre + way * np.min(far, axis=1, keepdims=True)
