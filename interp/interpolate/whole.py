@@ -273,9 +273,9 @@ def _brought(ready: Ready, done: list[dict[str, Any]]) -> list[str]:
     if not (wanted and isinstance(take, OfSequence)):
         return []
     known = any(each["remark"] != NO_EVENTS for each in done[:-1])
-    said = ["its cameras stand apart: events are brought to where the frames saw the same change"] * (
-        take.apart and known
-    )
+    said = []
+    if take.apart and known:
+        said.append("its cameras stand apart: events are brought to where the frames saw the same change")
     if take.late_us:
         late = f"{abs(take.late_us)} us {'late' if take.late_us > 0 else 'early'}"
         said.append(
