@@ -72,4 +72,4 @@ def _used(facts: dict[str, Any]) -> str:
     """How many of the videos that were given there are scenes of, by the beginnings of their names."""
     given = len(facts["spec"]["videos"])
     used = len({name.rpartition("-")[0] for name in facts["of_scenes"]})
-    return f"{counted(given, 'video')}" if used == given else f"{used} of {given} videos"
+    return counted(given, "video") if used == given else f"{used} of {given} videos"

@@ -91,6 +91,11 @@ class Gaps(NamedTuple):
         """Places in a gap of the frames between the key frames."""
         return [*range(1, self.protocol.multiple)]
 
+    @property
+    def scored(self) -> set[int | None]:
+        """The frames that are scored, of all gaps."""
+        return {*self.within([*self.protocol.positions], self.every)}
+
     def within(self, places: Sequence[int | None], gaps: int, keys: bool = False) -> Frames:
         """The frames at places of the first gaps, and key frames around each if these are there, too."""
         multiple = self.protocol.multiple
@@ -196,8 +201,7 @@ def _of_own(files: Sequence[Path], gaps: Gaps, numbers: Numbers, own: Sequence[i
     if not numbers.of or not {*numbers.of} <= frame_of.keys():
         return None
     named = [frame_of[number] for number in numbers.of]
-    scored = {*gaps.within([*gaps.protocol.positions], gaps.every)}
-    if {*numbers.of} <= scored or not {*named} <= scored:
+    if {*numbers.of} <= gaps.scored or not {*named} <= gaps.scored:
         return None
     taken = f"taken for the frames whose own pictures have the same numbers, {_ends(numbers)}"
     said = f"{counted(len(files), 'picture')}, {taken}"
@@ -206,9 +210,8 @@ def _of_own(files: Sequence[Path], gaps: Gaps, numbers: Numbers, own: Sequence[i
 
 def _only_from_1(gaps: Gaps, numbers: Numbers) -> bool:
     """Whether numbers with gaps are all of frames that are scored if 1 is that of the first, and not if it is 0."""
-    scored = {*gaps.within([*gaps.protocol.positions], gaps.every)}
     named = {number - 1 for number in numbers.of}
-    return not numbers.gapless and named <= scored and not {*numbers.of} <= scored
+    return not numbers.gapless and named <= gaps.scored and not {*numbers.of} <= gaps.scored
 
 
 def _own_count(gaps: Gaps, count: int) -> list[int]:
