@@ -31,7 +31,7 @@ class EventCursor:
         self.covered_us = begin_us, begin_us + self._recording.duration_us
         first = next(self._recording.blocks(), None)
         self.seen_us = None if first is None else (int(first.t[0]), self.covered_us[1])
-        self.silent_us = begin_us if self.seen_us is None or self.file.start_us else self.seen_us[0]
+        self.silent_us = begin_us if self.seen_us is None or self.file.says_start else self.seen_us[0]
         self._blocks: Iterator[Events] = iter(())
         self._held, self._from_us = Events.empty(), None if self.count else begin_us
 

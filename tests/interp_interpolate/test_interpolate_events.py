@@ -296,21 +296,23 @@ def test_what_remembers_sees_each_event_of_a_shot_once(
     assert seen == [(400, False), (400, True), (400, True), (400, False), (400, True)]
 
 
+@pytest.mark.parametrize("begin_us", [0, 1_000_000])
 @pytest.mark.parametrize("stated", [False, True])
 def test_a_file_that_states_no_beginning_knows_nothing_of_the_time_before_its_events(
-    tmp_path: Path, stated: bool
+    tmp_path: Path, stated: bool, begin_us: int
 ) -> None:
     """And one that does knows that there were none."""
-    begin_us = 1_000_000
     source = images(tmp_path / "in", moving(7), start_us=begin_us)
     some = drawn()
     events = Events(some.t + begin_us + 3 * STEP_US, some.x, some.y, some.p)
-    late = Recording(
-        SIZE, begin_us * stated, int(events.t[-1]) - begin_us * stated, len(events), lambda: iter([events])
-    )
+    late = Recording(SIZE, begin_us, int(events.t[-1]) - begin_us, len(events), lambda: iter([events]))
     write = format_named("npz").write
     assert write is not None
     write(tmp_path / "late.npz", late)
+    if not stated:
+        with np.load(tmp_path / "late.npz") as written:
+            columns = {name: written[name] for name in "txyp"}
+        np.savez(tmp_path / "late.npz", **columns)
     told = interpolate(
         source, tmp_path / "out", multiple=2, method="bridge", options=Options(events=tmp_path / "late.npz")
     )
