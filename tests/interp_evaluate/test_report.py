@@ -291,6 +291,16 @@ def test_a_plot_says_how_many_frames_there_are_as_the_table_does() -> None:
     assert [text for text in ElementTree.fromstring(plot.svg).itertext() if text in counts] == counts * 2
 
 
+@pytest.mark.parametrize("values", [(1.0001, 1.0002, 2.0), (1500.2, 1500.5, 9e3), (0.0, 1e-9, 0.5)])
+def test_no_two_bins_are_called_alike(values: tuple[float, ...]) -> None:
+    """However little tells their values apart; what three digits tell apart has no more."""
+    rows = [row(group=k, psnr=30.0 - 4 * k, ssim=0.9, motion_px=value) for k, value in enumerate(values)]
+    ((condition, edges),) = varying(rows)
+    labels = [line.name for line in condition_table(rows, condition, edges, "psnr", "").lines]
+    assert [float(label.replace(",", "")) for label in labels] == list(values)
+    assert f"from {labels[1]}" in markdown(document(rows, {}))
+
+
 def test_where_methods_break_down_is_said() -> None:
     rows = [
         row(method=method, position=p, psnr=30.0 - lost * p, ssim=0.9, motion_px=10.0 * p)

@@ -11,6 +11,7 @@ from interp.evaluate.tables import Mean
 SCORES = {"psnr": "PSNR [dB]", "ssim": "SSIM"}  # of the Time Lens protocol
 NOTHING = "–"
 PSNR_DIGITS, SSIM_DIGITS = 2, 3
+FEW = range(3, 18)  # digits of numbers that are meant to be short
 
 
 def digits_of(field: str) -> int:
@@ -25,11 +26,17 @@ def number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "∞"
 
 
-def short(value: float) -> str:
-    """A number as short as three digits allow."""
+def short(value: float, among: Iterable[float] = ()) -> str:
+    """A number as short as three digits allow, or as many more as tell it from the others of these."""
     if math.isnan(value):
         return NOTHING
-    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    others = {other for other in among if other != value}
+    digits = next((n for n in FEW if _of(value, n) not in {_of(other, n) for other in others}), FEW[-1])
+    return _of(value, digits)
+
+
+def _of(value: float, digits: int) -> str:
+    return f"{value:,.0f}" if abs(value) >= 10 ** (digits - 1) else f"{value:.{digits}g}"
 
 
 def spread(mean: Mean, digits: int) -> str:

@@ -141,7 +141,7 @@ def breaking_points(rows: Sequence[Row], condition: Condition, edges: Sequence[f
         bins = binned(part, condition.field, "psnr", edges)
         if bins:
             found = breaks_at(bins, CLEARLY_DB)
-            said.append(f"{method} {'nowhere' if found is None else f'from {short(found.low)}'}")
+            said.append(f"{method} {'nowhere' if found is None else f'from {short(found.low, edges)}'}")
     if said and all(each.endswith(" nowhere") for each in said):
         return f"No method is more than {CLEARLY_DB:g} dB below its own mean in the first bin."
     return f"More than {CLEARLY_DB:g} dB below its own mean in the first bin [{condition.unit}]: {', '.join(said)}."
@@ -150,8 +150,8 @@ def breaking_points(rows: Sequence[Row], condition: Condition, edges: Sequence[f
 def _span(one: Bin, edges: Sequence[float]) -> str:
     """What a bin is of: one value where values are a bin each, otherwise from edge to edge."""
     if one.low == one.high or (math.isclose(one.at, one.low) and edges[-1] == edges[-2]):
-        return short(one.low)
-    return f"{short(one.low)} … {short(one.high)}"
+        return short(one.low, edges)
+    return f"{short(one.low, edges)} … {short(one.high, edges)}"
 
 
 def _plain(value: float, field: str) -> tuple[float, str]:
