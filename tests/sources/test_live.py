@@ -16,6 +16,7 @@ import av
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from vid2ev import convert
 from vid2ev.commands import main
@@ -223,6 +224,20 @@ def test_what_is_no_video_is_refused(pipe, data: bytes) -> None:
     pipe(data)
     with pytest.raises(DataError, match="standard input: "):
         open_source("-")
+
+
+def test_a_still_avif_is_no_clip_in_a_pipe_either(pipe) -> None:
+    """One that moves is, and the still beside it is not taken for it."""
+    pictures = [Image.fromarray(np.full((24, 32, 3), 60 * k + 30, np.uint8)) for k in range(4)]
+    content = io.BytesIO()
+    pictures[0].save(content, "avif")
+    pipe(content.getvalue())
+    with pytest.raises(UsageError, match=r"standard input: a single picture; .*--motion"):
+        open_source("-")
+    content = io.BytesIO()
+    pictures[0].save(content, "avif", save_all=True, append_images=pictures[1:], duration=40)
+    pipe(content.getvalue())
+    assert len(list(open_source("-").frames())) == 4
 
 
 def test_a_cut_off_pipe_gives_what_it_has(pipe) -> None:

@@ -154,7 +154,12 @@ class Piped:
                 " the file"
             ) from error
         with container:
-            yield container, video_stream(container, self.name)
+            stream = video_stream(container, self.name)
+            if _is_still(stream):
+                raise UsageError(
+                    f"{self.name}: a single picture; pipe {STREAMS} in, or give a PNG of it with --motion pan"
+                )
+            yield container, stream
 
 
 class LiveStream:
