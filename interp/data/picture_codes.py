@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.light.netpbm import white_in
-from vid2ev.light.picture_files import decoded
+from vid2ev.light.picture_files import decoded, white_in
 
 
 def codes_in(path: Path) -> np.ndarray | None:

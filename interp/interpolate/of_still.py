@@ -27,8 +27,7 @@ from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import open_events, survey
 from vid2ev.formats.matlab import is_mat
-from vid2ev.light.netpbm import white_in
-from vid2ev.light.picture_files import read_picture, remarks_on_tags
+from vid2ev.light.picture_files import read_picture, remarks_on_tags, white_in
 from vid2ev.light.pictures import PictureReader
 from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.recording.exposures import LATEST_US

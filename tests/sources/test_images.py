@@ -172,6 +172,8 @@ def test_other_files_in_the_folder_do_not_matter(tmp_path: Path) -> None:
         (["b/manifest.json", "a/manifest.json", "README.md"], r"the recordings in it, such as .*/a$"),
         (["b/c/manifest.json", "notes.md"], r"expected \.png, "),
         (["b/2/0.png", "a/c/3/0.png", "a/1.txt"], r"the folders of clips in it, such as .*/b$"),
+        (["close/seq/images_corrected/0.png", "README.md"], r"the folders of clips in it, such as .*/close/seq$"),
+        (["close/test/seq/images_corrected/0.png"], r"the folders of clips in it, such as .*/close/test/seq$"),
     ],
 )
 def test_a_folder_of_sources_or_recordings_says_which_could_be_given(

@@ -36,15 +36,25 @@ def codes(shape: tuple[int, ...], dtype: type = np.uint8) -> np.ndarray:
 # ---------------------------------------------------------------------------------------------------------- upright
 
 
+def marked(webp: bytes) -> bytes:
+    """A WebP, at the end of which is EXIF, with the mark before it that JPEG has, as libvips writes it."""
+    before, exif = webp.split(b"EXIF")
+    exif = b"Exif\0\0" + exif[4 : 4 + struct.unpack("<I", exif[:4])[0]]
+    content = before[8:] + b"EXIF" + struct.pack("<I", len(exif)) + exif + b"\0" * (len(exif) % 2)
+    return b"RIFF" + struct.pack("<I", len(content)) + content
+
+
 @pytest.mark.parametrize("orientation", range(1, 9))
-@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp", "marked.webp"])
 def test_exif_turns_a_picture_as_viewers_do(tmp_path: Path, orientation: int, suffix: str) -> None:
     exif = Image.Exif()
     exif[0x0112] = orientation
     scene = np.kron(codes((3, 4, 3)), np.ones((8, 8, 1), np.uint8))
     path = tmp_path / f"a.{suffix}"
-    options = {"jpg": {"quality": 95}, "webp": {"lossless": True}}.get(suffix, {})
+    options = {"jpg": {"quality": 95}}.get(suffix, {"lossless": True} if "webp" in suffix else {})
     Image.fromarray(scene).save(path, exif=exif, **options)
+    if suffix == "marked.webp":
+        path.write_bytes(marked(path.read_bytes()))
     with Image.open(path) as shown:
         expected = np.asarray(ImageOps.exif_transpose(shown).convert("RGB"))
     pixels = read_picture(path).pixels
@@ -184,6 +194,40 @@ def test_no_layout_of_a_tiff_is_read_for_another(tmp_path: Path, dtype: type, bi
             refused += 1
             assert dtype != np.uint8 and f"a TIFF of {dtype(0).nbytes * 8} bits" in str(error)
     assert refused == (0 if dtype is np.uint8 else 3)
+
+
+def packed_tiff(values: np.ndarray, bits: int) -> bytes:
+    """A TIFF of codes [H, W, C] of so many bits, without gaps between them."""
+    height, width, channels = values.shape
+    single = np.unpackbits(values.astype(">u2").view(np.uint8).reshape(height, -1, 2), axis=-1)[..., 16 - bits :]
+    rows = np.packbits(single.reshape(height, -1), axis=-1).tobytes()
+    colour, end = 2 if channels == 3 else 1, 122
+    tags = [
+        (256, width), (257, height), (258, bits), (259, 1), (262, colour), (273, end + 6), (277, channels),
+        (278, height), (279, len(rows)),
+    ]  # fmt: skip
+    entries = [struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags]
+    if channels == 3:
+        entries[2] = struct.pack("<HHII", 258, 3, 3, end)
+    head = b"II*\0" + struct.pack("<IH", 8, len(tags)) + b"".join(entries) + bytes(4)
+    assert len(head) == end
+    return head + struct.pack("<3H", bits, bits, bits) + rows
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("bits", [10, 12, 14])
+def test_a_tiff_of_codes_without_gaps_is_read_in_their_bits(tmp_path: Path, bits: int, channels: int) -> None:
+    """White is the largest of them, and who says so besides says nothing else."""
+    white = 2**bits - 1
+    values = np.linspace(0, white, 24 * channels).astype(int).reshape((4, 6, channels))
+    for k in range(2):
+        (tmp_path / f"{k}.tif").write_bytes(packed_tiff(values, bits))
+    np.testing.assert_array_equal(read_picture(tmp_path / "0.tif").pixels.reshape(values.shape), values)
+    for transfer in ("linear", f"linear:{bits}bit"):
+        source = open_source(tmp_path, fps=1, colour="rgb", transfer=transfer)
+        first, _ = source.frames()
+        np.testing.assert_allclose(first.light, np.broadcast_to(values / white, (4, 6, 3)), atol=1e-6)
+        assert source.warnings == [] and source.describe()["bits"] == bits
 
 
 def test_a_tiff_with_pages_is_a_clip(tmp_path: Path) -> None:

@@ -20,9 +20,9 @@ TEXT, PAM, END = (b"P2", b"P3"), b"P7", b"ENDHDR\n"
 WITH_WHITE = (*TEXT, b"P5", b"P6", PAM)
 
 
-def white_in(path: Path) -> int | None:
-    """The code that is white, where it is not the largest of 8 or 16 bits: 1023 as FFmpeg writes 10 of them, 100 or
-    anything else.  None for all others."""
+def white_of_pnm(path: Path) -> int | None:
+    """The code that is white by the header, where it is not the largest of 8 or 16 bits: 1023 as FFmpeg writes 10 of
+    them, 100 or anything else.  None for all others."""
     head = head_of(path)
     words = re.sub(rb"#[^\n]*", b" ", head).split(maxsplit=4)
     said = _pam(head).get(b"MAXVAL", b"") if head.startswith(PAM) else words[3] if len(words) > 3 else b""

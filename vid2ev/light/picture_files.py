@@ -1,9 +1,10 @@
 """Files of pictures: pixels, and which colours red, green and blue are in them.
 
 OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says; PAM
-and PNM of text it is given as PNM of bytes (`netpbm`).  The package OpenEXR reads EXR.  A PNG says what its codes stand
-for (`png_tags`).  Transparency is left out.  Of an EXR with several parts or layers the first with colour counts: R, G,
-B or else Y.  Its data window is set into its display window, black around, and its chromaticities hold.
+and PNM of text it is given as PNM of bytes (`netpbm`), and some WebP with EXIF that it can read (`webp`).  The package
+OpenEXR reads EXR.  A PNG says what its codes stand for (`png_tags`).  Transparency is left out.  Of an EXR with several
+parts or layers the first with colour counts: R, G, B or else Y.  Its data window is set into its display window, black
+around, and its chromaticities hold.
 
 Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112.
 """
@@ -20,12 +21,13 @@ import numpy as np
 from vid2ev.errors import DataError
 from vid2ev.light.bmp import check_bmp
 from vid2ev.light.icc import profile_name, remarks_on_profile
-from vid2ev.light.netpbm import PAM, TEXT, plain_pnm
-from vid2ev.light.pictures import TYPES
+from vid2ev.light.netpbm import PAM, TEXT, plain_pnm, white_of_pnm
+from vid2ev.light.pictures import TYPES, white_of
 from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
-from vid2ev.light.recognise import BMP, EXR, PNG, TIFF, head_of
-from vid2ev.light.tiff_tags import check_tiff
+from vid2ev.light.recognise import BMP, EXR, PNG, TIFF, head_of, is_webp
+from vid2ev.light.tiff_tags import check_tiff, packed_bits
+from vid2ev.light.webp import without_mark
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr, plain_name
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
@@ -60,6 +62,14 @@ def read_picture(path: Path, page: int = 0) -> Picture:
     return _checked(Picture(pixels, primaries, transfer), path)
 
 
+def white_in(path: Path) -> int | None:
+    """The code that is white in a file, where it is not the largest of 8 or 16 bits."""
+    if head_of(path).startswith(TIFF):
+        bits = packed_bits(path)
+        return white_of(bits) if bits else None
+    return white_of_pnm(path)
+
+
 def remarks_on_tags(path: Path, pixels: np.ndarray) -> list[str]:
     """That a file says of its codes what is not taken up; of light, which has no codes, nothing is said."""
     if pixels.dtype.kind == "f":
@@ -91,7 +101,8 @@ def _checked(picture: Picture, path: Path) -> Picture:
 
 
 def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.ndarray]:
-    """What OpenCV makes of a file, blue first, [H, W] or [H, W, C]; of a TIFF pages from `page` on, at most `count`.
+    """What OpenCV makes of a file, blue first, [H, W] or [H, W, C]; of a TIFF pages from `page` on, at most `count`,
+    in the codes that it holds.
 
     flags   cv2.IMREAD_...
     Nothing for a file that it cannot read.  Raises DataError for one that claims more memory than it may.
@@ -104,9 +115,10 @@ def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.nd
     try:
         with _silent_decoders(), plain_name(path) as name:
             if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
-                return list(cv2.imreadmulti(name, page, count, flags=flags)[1])
-            anew = head.startswith((*TEXT, PAM))
-            one = cv2.imdecode(np.frombuffer(plain_pnm(path), np.uint8), flags) if anew else cv2.imread(name, flags)
+                pages, bits = cv2.imreadmulti(name, page, count, flags=flags)[1], packed_bits(path)
+                return [np.right_shift(page, 16 - bits) if bits and page.dtype == np.uint16 else page for page in pages]
+            anew = plain_pnm(path) if head.startswith((*TEXT, PAM)) else without_mark(path) if is_webp(head) else None
+            one = cv2.imread(name, flags) if anew is None else cv2.imdecode(np.frombuffer(anew, np.uint8), flags)
             return [] if one is None else [one]
     except (cv2.error, ValueError, KeyError, OverflowError) as error:
         if "MAX_IMAGE" not in str(error):

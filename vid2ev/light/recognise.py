@@ -54,10 +54,15 @@ def recognise(path: Path) -> Kind:
         return "video"
     if head.startswith(JPEG) and path.suffix.lower() in MOTION_JPEG_SUFFIXES:
         return "video"
-    webp = head.startswith(b"RIFF") and head[8:12] == b"WEBP"
+    webp = is_webp(head)
     if webp and head[12:16] == b"VP8X" and head[20:21] and head[20] & ANIMATED:
         return "video"
     return "picture" if webp or head.startswith(PICTURES) or NETPBM.match(head) else "video"
+
+
+def is_webp(head: bytes) -> bool:
+    """Whether a file that begins so is a WebP."""
+    return head.startswith(b"RIFF") and head[8:12] == b"WEBP"
 
 
 def head_of(path: Path) -> bytes:

@@ -1,7 +1,8 @@
 """What a TIFF says of how its samples lie, and which of them OpenCV takes for others without a word.
 
 Of more than 8 bits it reads planes of their own as one, does not turn codes of which 0 is white, and shortens grey
-beside transparency to 8 bits.
+beside transparency to 8 bits.  Codes of 10 to 14 bits without gaps between them it shifts up to 16, where white is not
+the largest code.
 
 Source: TIFF revision 6.0, sections 2 and 8; BigTIFF, Adobe's proposal of 2007: places of 8 bytes.
 """
@@ -41,6 +42,13 @@ def check_tiff(path: Path) -> None:
             f"{path}: a TIFF of {bits} bits, grey with transparency, which is read of 8 bits only; write it"
             " anew without"
         )
+
+
+def packed_bits(path: Path) -> int | None:
+    """Of how many bits the codes of a TIFF are, where these are more than 8 and do not fill 16."""
+    with open(path, "rb") as file:
+        bits = numbers_in(file).get(BITS, 1)
+    return bits if 8 < bits < 16 else None
 
 
 def numbers_in(file: BinaryIO) -> dict[int, int]:

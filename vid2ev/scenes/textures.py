@@ -86,8 +86,7 @@ def photograph_file(name: str) -> Path:
 
 @lru_cache(maxsize=64)
 def _photograph(path: Path, written: Stamp) -> np.ndarray:
-    from vid2ev.light.netpbm import white_in
-    from vid2ev.light.picture_files import read_picture
+    from vid2ev.light.picture_files import read_picture, white_in
     from vid2ev.light.pictures import PictureReader
 
     pixels, primaries, tagged = read_picture(path)

@@ -24,8 +24,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import recognise
-from vid2ev.light.netpbm import white_in
-from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags
+from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags, white_in
 from vid2ev.light.pictures import PictureReader, bits_of, white_of
 from vid2ev.light.radiance import exposure_in
 from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
@@ -49,6 +48,7 @@ from vid2ev.terminal import counted
 from vid2ev.untrusted import json_of, read_text
 
 TIMESTAMPS = "timestamps.txt"
+DEEPEST = 3  # folders below one that holds no images, in which some are looked for to be named
 FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of frames that they have made
 
 
@@ -207,7 +207,8 @@ def _instead(folder: Path) -> str:
     """What to give in place of a folder without pictures."""
     held = [Path(source) for source in sources_in(str(folder))] if folder.is_dir() else []
     held = [path for path in held if path != folder][:1]
-    below = (path for path in sorted(folder.glob("*/")) if sources_in(str(path)) != [str(path)])
+    folders = (path for depth in range(1, DEEPEST + 1) for path in sorted(folder.glob("*/" * depth)))
+    below = (path for path in folders if sources_in(str(path)) != [str(path)])
     events = any(path.is_file() and recognise(path) for path in held)
     for kind, first in (
         ("event files" if events else "videos or folders of images", next(iter(held), None)),

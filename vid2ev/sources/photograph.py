@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.light.netpbm import white_in
-from vid2ev.light.picture_files import read_picture, remarks_on_tags
+from vid2ev.light.picture_files import read_picture, remarks_on_tags, white_in
 from vid2ev.light.pictures import PictureReader
 from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.spline import seen
