@@ -364,6 +364,21 @@ def test_arrays_that_are_no_events(tmp_path: Path) -> None:
         list(read_events(tmp_path / "wide.npz"))
 
 
+@pytest.mark.parametrize("kind", ["rows", "columns", "seconds", "v2e"])
+def test_a_table_in_another_order_says_which_one_is_read(tmp_path: Path, kind: str) -> None:
+    events = events_of(np.arange(1, 200) * 1001, (640, 480))
+    t = events.t / 1e6 if kind == "seconds" else events.t
+    table = np.stack([events.x, events.y, t, events.p], axis=1)
+    path = tmp_path / ("a.h5" if kind == "v2e" else "a.npy")
+    if kind == "v2e":
+        with h5py.File(path, "w") as file:
+            file["events"] = table
+    else:
+        np.save(path, np.asfortranarray(table) if kind == "columns" else table)
+    with pytest.raises(DataError, match="; save it with the columns t, x, y, p, in this order"):
+        list(read_events(path))
+
+
 def test_numpy_and_h5py_read_what_is_written(tmp_path: Path) -> None:
     recording = dense()
     events = all_events(recording)
@@ -428,6 +443,11 @@ def test_text_of_others(tmp_path: Path, name: str, text: str) -> None:
     assert rows(file) == [(10, 1, 2, 1), (20, 3, 4, 0)]
     assert file.size == ((640, 480) if text in ("Metavision", "faery", "with size") else None)
     assert bool(file.warnings) == (text == "microseconds")
+
+
+@pytest.mark.parametrize("head", [b"t,x,y,p\n-20,1,2,1\n", b"%geometry:640,480\n1,2,1,-20\n"])
+def test_text_may_begin_before_the_instant_that_it_counts_from(tmp_path: Path, head: bytes) -> None:
+    assert rows(opened(tmp_path, head, "csv")) == [(-20, 1, 2, 1)]
 
 
 @pytest.mark.parametrize(

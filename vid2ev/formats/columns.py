@@ -28,16 +28,24 @@ def labels(path: Path, label: np.ndarray) -> np.ndarray:
     return label.astype(np.uint8)
 
 
-def pixels(path: Path, x: np.ndarray, y: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pixels(
+    path: Path, x: np.ndarray, y: np.ndarray, p: np.ndarray, *, named: bool = True
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns and rows uint16, polarities uint8: 1 is ON, of what is above 0.
 
+    named   whether the file says which is which; a table that does not may be in another order
     Raises DataError for fractions, what is no number, and columns and rows that no sensor has.
     """
+    other_order = "" if named else "save it with the columns t, x, y, p, in this order, which they are taken for"
     if any(values.dtype.kind == "f" and not np.array_equal(values, np.rint(values)) for values in (x, y, p)):
-        raise DataError(f"{path} has columns, rows or polarities that are no whole numbers; round them first")
+        raise DataError(
+            f"{path} has columns, rows or polarities that are no whole numbers; {other_order or 'round them first'}"
+        )
     wide = [values for values in (x, y) if len(values) and values.dtype not in (np.uint8, np.uint16)]
     if any(values.min() < 0 or values.max().item() > 0xFFFF for values in wide):  # (float16 has no such number)
-        raise DataError(f"{path} has columns or rows that are not within 0 ... 65535; get another copy")
+        raise DataError(
+            f"{path} has columns or rows that are not within 0 ... 65535; {other_order or 'get another copy'}"
+        )
     return x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8)
 
 

@@ -52,7 +52,7 @@ def write_events(path: Path, recording: Recording) -> None:
 def _columns(head: bytes) -> tuple[list[str], int, tuple[int, int] | None] | None:
     """The columns, the lines before the first event, and the size if it is there; None if it is no such text."""
     head = head.removeprefix(MARK)
-    if (found := GEOMETRY.match(head)) and re.match(rb"(%.*\n)*(\d+,\d+,-?\d,\d+\r?\n|$)", head[found.end() :]):
+    if (found := GEOMETRY.match(head)) and re.match(rb"(%.*\n)*(\d+,\d+,-?\d,-?\d+\r?\n|$)", head[found.end() :]):
         return METAVISION, 1, (int(found[1]), int(found[2]))
     line = head.partition(b"\n")[0]
     if not re.fullmatch(rb"[\x20-\x7e]{7,1000}\r?", line):

@@ -40,6 +40,7 @@ NAMES = {
     "label": ("label", "labels"),
 }
 COLUMNS, TABLES = "txyp", ("events", "arr_0")
+OF_A_TABLE = tuple(f"column {name}" for name in COLUMNS)  # names of those that are stored by themselves
 ZIP_MAGIC, NPY_MAGIC = b"PK\x03\x04", b"\x93NUMPY"
 TIME = (1980, 1, 1, 0, 0, 0)  # of every member: the earliest that a zip file can say
 
@@ -54,6 +55,8 @@ class NpzEvents(Sequential):
             if columns is None:
                 raise DataError(f"{path} has no arrays t, x, y, p, nor one of events; it has {', '.join(arrays)}")
             self.labelled = "label" in columns
+            array, key = columns["t"]
+            self._named = not isinstance(key, tuple) and array is not arrays.get(OF_A_TABLE[0])
             self._types = {name: str(array.dtype) for name, (array, _) in columns.items()}
             size, start = (_small(arrays.get(name), count) for name, count in (("size", 2), ("start_us", 1)))
             self.size = (size[0], size[1]) if size and min(size) > 0 else None
@@ -98,7 +101,9 @@ class NpzEvents(Sequential):
         if t.dtype.kind == "f":
             t = np.rint(t.astype(np.float64) * self._scale)
         label = labels(self.path, column["label"]) if self.labelled else None
-        return Events(whole_us(self.path, t), *pixels(self.path, *(column[name] for name in "xyp")), label)
+        return Events(
+            whole_us(self.path, t), *pixels(self.path, *(column[name] for name in "xyp"), named=self._named), label
+        )
 
     @contextmanager
     def _opened(self) -> Iterator[dict[str, Array]]:
@@ -153,7 +158,7 @@ def _arrays(stack: ExitStack, path: Path) -> dict[str, Array]:
 def _table(name: str, opened: Callable[[], Any]) -> dict[str, Array]:
     """The array of this name, or its columns."""
     columns = open_columns(opened, len(COLUMNS))
-    return dict(zip(COLUMNS, columns, strict=True)) if columns else {name: open_array(opened())}
+    return dict(zip(OF_A_TABLE, columns, strict=True)) if columns else {name: open_array(opened())}
 
 
 def _columns(arrays: dict[str, Array]) -> dict[str, tuple[Array, Any]] | None:
@@ -166,6 +171,8 @@ def _columns(arrays: dict[str, Array]) -> dict[str, tuple[Array, Any]] | None:
             found[ours] = (arrays[name], None)
         elif table is not None and (field := next((name for name in names if name in fields), None)):
             found[ours] = (table, field)
+    if not found and OF_A_TABLE[0] in arrays:
+        found = {name: (arrays[column], None) for name, column in zip(COLUMNS, OF_A_TABLE, strict=True)}
     if table is not None and not found and len(table.shape) == 2 and table.shape[1] == 4 and not table.dtype.names:
         found = {name: (table, (slice(None), column)) for column, name in enumerate(COLUMNS)}
     kinds = [(array.dtype[key] if isinstance(key, str) else array.dtype).kind for array, key in found.values()]

@@ -66,7 +66,7 @@ class V2eEvents(Sequential):
             for at in range(0, len(table), PART):
                 rows = table[at : at + PART]
                 t, x, y, p = (rows[:, k] for k in range(COLUMNS))
-                events = Events(whole_us(self.path, t, self.start_us), *pixels(self.path, x, y, p))
+                events = Events(whole_us(self.path, t, self.start_us), *pixels(self.path, x, y, p, named=False))
                 events, left = self._inside(events)
                 outside += left
                 yield events
