@@ -30,7 +30,7 @@ from numba import njit
 
 from vid2ev import UsageError
 from vid2ev.commands import main
-from vid2ev.commands.summary import file_facts, of_the_clip, plan_text, result_facts, short
+from vid2ev.commands.summary import file_facts, of_the_clip, plan_text, result_facts, sensor_text, short
 from vid2ev.formats import FORMATS, format_named
 from vid2ev.interrupts import heard, never_lost
 from vid2ev.making import conversion
@@ -310,6 +310,14 @@ def test_warnings_of_a_rig_say_which_cameras_they_are_about() -> None:
     results = {name: {"counts": counts, "duration_us": 1, "warnings": texts} for name, texts in said.items()}
     facts = result_facts({"results": results, "cameras": {name: {"size": [1, 1]} for name in said}})
     assert [text for name, text in facts if name == "warning"] == ["left: a", "b", "left, right: c"]
+
+
+def test_a_frame_camera_without_blur_is_not_said_to_expose() -> None:
+    """Whatever its exposure would be; manifests of before there was such a camera do not speak of blur."""
+    for blur, said in ({"blur": False}, "an instant"), ({"blur": True}, "800 us"), ({}, "800 us"):
+        parameters = {"frame_rate_hz": 25.0, "exposure_us": 800.0, "line_us": 10.0, **blur}
+        text = sensor_text({"kind": "cis", "name": "mine", "size": [8, 6], "parameters": parameters})
+        assert text == f"mine, 8x6, 25 frames/s of {said}, lines 10 us apart"
 
 
 def test_one_of_anything_is_not_said_as_of_several() -> None:

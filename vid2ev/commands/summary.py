@@ -50,7 +50,8 @@ def sensor_text(sensor: Mapping[str, Any]) -> str:
     parameters = sensor["parameters"]
     if sensor.get("kind") == "cis":
         shutter = f", lines {parameters['line_us']:g} us apart" if parameters["line_us"] else ""
-        how = f"{parameters['frame_rate_hz']:g} frames/s of {parameters['exposure_us']:g} us{shutter}"
+        exposure = f"{parameters['exposure_us']:g} us" if parameters.get("blur", True) else "an instant"
+        how = f"{parameters['frame_rate_hz']:g} frames/s of {exposure}{shutter}"
     else:
         how = f"thresholds ON {parameters['threshold_on']:g} and OFF {parameters['threshold_off']:g}"
     return f"{sensor['name']}, {'x'.join(map(str, sensor['size']))}, {how}"
