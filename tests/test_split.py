@@ -173,6 +173,32 @@ def test_what_is_interrupted_anywhere_goes_on_to_the_same_bytes(clip: str, tmp_p
     assert {path.name for path in tmp_path.iterdir()} == {"whole", "made"}
 
 
+def test_of_parts_whose_workers_ended_before_a_checkpoint_nothing_is_left(clip: str, tmp_path: Path) -> None:
+    """Of others what can be gone on with, and what somebody is still making."""
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1}
+    parts = [tmp_path / "made.parts" / f"{number}-of-4.partial" for number in range(4)]
+
+    def begun(tasks: Sequence[Task]) -> None:
+        for part in parts[: len(tasks)]:
+            part.mkdir()
+            (part / "job.json").write_text("{}")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        convert_split(clip, tmp_path / "made", "tiles", 2, begun, **options)
+    assert not [*tmp_path.iterdir()]
+
+    def left(_: Sequence[Task]) -> None:
+        (parts[1] / "checkpoint.npz").touch()
+        begun([])
+
+    for part in parts[:3]:
+        part.mkdir(parents=True)
+    with Held(parts[2]), pytest.raises(KeyboardInterrupt):
+        convert_split(clip, tmp_path / "made", "tiles", 4, left, resume=True, **options)
+    assert [path for path in sorted(parts[0].parent.iterdir()) if path.is_dir()] == parts[1:3]
+
+
 @pytest.mark.parametrize("kind", ["tiles", "approximate"])
 def test_a_seed_that_is_drawn_is_that_of_all_parts_and_of_those_made_later(
     clip: str, tmp_path: Path, kind: str

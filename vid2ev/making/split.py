@@ -30,7 +30,7 @@ from vid2ev.making.conversion import Report, check_outputs, convert, telling
 from vid2ev.making.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
 from vid2ev.recording.disk import writing
 from vid2ev.recording.folder import begun_job, check_free
-from vid2ev.recording.held import LOCK, Held
+from vid2ev.recording.held import LOCK, Held, undisturbed
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
@@ -115,9 +115,12 @@ def _held(directory: Path) -> Iterator[Path]:
             held.take()
         yield beside
     finally:
-        held.close()
-        with suppress(OSError):
-            beside.rmdir()
+        with undisturbed():
+            if held:
+                _remove_parts_not_begun(beside)
+            held.close()
+            with suppress(OSError):
+                beside.rmdir()
 
 
 def begun_parts(beside: Path) -> list[Path]:
@@ -130,6 +133,15 @@ def _remove_parts(beside: Path) -> None:
     for part in begun_parts(beside):
         with writing(part), Held(part) if part.suffix == ".partial" else nullcontext():
             shutil.rmtree(part, ignore_errors=True)
+
+
+def _remove_parts_not_begun(beside: Path) -> None:
+    """Remove parts without a checkpoint, of workers that were ended before they came to one; others are left alone that
+    a worker left over is still making."""
+    for part in begun_parts(beside):
+        if part.suffix == ".partial" and not (part / "checkpoint.npz").exists():
+            with suppress(UsageError, OSError), Held(part):
+                shutil.rmtree(part, ignore_errors=True)
 
 
 def _tasks(video: str, parts: Sequence[dict[str, Any]], folders: Sequence[Path], options: dict[str, Any]) -> list[Task]:
