@@ -120,6 +120,21 @@ def test_a_task_that_fails_is_tried_again_but_not_one_that_cannot_be_meant(
     assert [facts["compiling"] for name, facts in told if name == "compiles" and "compiling" in facts] == [True, False]
 
 
+@pytest.mark.parametrize("most", [16, 31])
+def test_too_few_open_files_are_one_sentence_before_any_process_begins(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dask tries again and again."""
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (most, 1 << 20))
+    monkeypatch.setattr("distributed.LocalCluster", None)
+    with (
+        pytest.raises(DataError, match=rf"^2 processes .* need 32 open files or more, and {most} may be; raise"),
+        Workers(2).client(),
+    ):
+        pass
+
+
 def test_a_worker_that_is_killed_costs_no_task_its_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     tasks = [Task("dies_once", made.dies_once)]

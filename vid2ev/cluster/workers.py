@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LEAST_BYTES = 128 << 20  # a process that does nothing yet takes half of it, and would be ended again and again
+FILES, FILES_EACH = 16, 8  # that are open here at least, and for each process beside
 REACHED_S = 20  # within which a scheduler has to answer
 ONE_THREAD_EACH = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 HERE = {  # of Dask's configuration: a process ends at its limit of memory, and is not paused or spilled to disk before
@@ -91,6 +92,7 @@ class Workers:
         import dask
         from distributed import Client, LocalCluster
 
+        _check_files(self.jobs)
         threads = dict.fromkeys(ONE_THREAD_EACH, str(self.threads))
         memory: Any = 1 / self.jobs if self.memory is None else _bytes_of(self.memory)
         begun = dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries})
@@ -108,6 +110,20 @@ class Workers:
 def has_dask() -> bool:
     """Whether the extra `cluster` is installed."""
     return find_spec("distributed") is not None
+
+
+def _check_files(jobs: int) -> None:
+    """Raise DataError where so few files may be open that Dask could not begin: it would try again and again."""
+    if find_spec("resource") is None:  # (on Windows)
+        return
+    import resource
+
+    most, least = resource.getrlimit(resource.RLIMIT_NOFILE)[0], FILES + FILES_EACH * jobs
+    if 0 <= most < least:
+        raise DataError(
+            f"{jobs} processes to share the work with need {least} open files or more, and {most} may be; raise that"
+            " (ulimit -n), or do without (--jobs 1)"
+        )
 
 
 def _bytes_of(memory: str) -> int:
