@@ -30,7 +30,7 @@ from vid2ev.cluster.workers import Workers, has_dask
 from vid2ev.errors import DiskError
 from vid2ev.making.conversion import telling
 from vid2ev.recording.destination import check_destination, partial_of
-from vid2ev.recording.disk import sync, whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, sync, whole_file, writing
 from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import difference, read_manifest, versions
 
@@ -74,7 +74,7 @@ def write_dataset(
     if (made_in / "job.json").exists() and not resume:
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
     scenes, unusable = scenes_of(spec)
-    with writing(directory), Held(made_in):
+    with writing(directory, THEN_RESUME), Held(made_in):
         _begin(made_in / "job.json", job, directory)
         made = sorted(_all(scenes, made_in, spec, workers, share, report))
         facts = _facts(job, spec, made, unusable)
@@ -141,7 +141,7 @@ def make_scene(scene: Scene, folder: Path, layout: str, multiple: int, tell: Tel
         return Made(scene.name, facts_of(target, multiple, scene))
     except DiskError as error:  # (its own remedy is for who chose the folder of this recording alone)
         reason = getattr(error.__cause__, "strerror", None) or "the disk does not take it"
-        raise DiskError(f"{target} cannot be written: {reason}; make room or access there, then --resume") from error
+        raise DiskError(f"{target} cannot be written: {reason}; {THEN_RESUME}") from error
     except (DataError, UsageError) as error:
         return Made(scene.name, {}, str(error))
 

@@ -26,7 +26,7 @@ from interp.data.making import made
 from interp.data.settings import ClipSettings
 from vid2ev.cluster.processes import processes
 from vid2ev.errors import UsageError
-from vid2ev.recording.disk import writing
+from vid2ev.recording.disk import THEN_RESUME, writing
 from vid2ev.sensors.devices import CPU, Device
 
 AHEAD = 48  # clips that are made before they are drawn from
@@ -66,7 +66,7 @@ class Pool:
         self.settings, self.seed, self.begin, self.most, self.fresh = settings, seed, begin, most, fresh
         self.device = device
         self.folder = folder / f"{known_by(settings, besides=besides)}-{seed}-{VERSION}"
-        with writing(self.folder):
+        with writing(self.folder, THEN_RESUME):
             self.folder.mkdir(parents=True, exist_ok=True)
 
     def window(self, sample: int) -> range:
@@ -85,7 +85,7 @@ class Pool:
     def keep(self, number: int, clip: Clip) -> None:
         """Write the clip of a number.  Raises DataError where the folder cannot be written."""
         path = self._path(number)
-        with writing(path):
+        with writing(path, THEN_RESUME):
             write_clip(path, clip)
 
     def missing(self, sample: int, ahead: int = AHEAD) -> list[int]:

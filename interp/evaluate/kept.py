@@ -23,7 +23,7 @@ from typing import Any, get_type_hints
 
 from interp.evaluate.row import Row
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
 from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import as_stated, difference
 from vid2ev.untrusted import json_of, read_text
@@ -46,7 +46,7 @@ class KeptRows:
             return {}
         whole, _, rest = path.read_bytes().rpartition(b"\n")
         if rest:
-            with writing(path):
+            with writing(path, THEN_RESUME):
                 os.truncate(path, len(whole) + bool(whole))
         try:
             lines = [json_of(line) for line in whole.splitlines()]
@@ -58,7 +58,7 @@ class KeptRows:
     def add(self, sequence: str, method: str, group: int, rows: Sequence[Row]) -> None:
         """The rows of a group are done."""
         path = self._path(sequence, method)
-        with writing(path):
+        with writing(path, THEN_RESUME):
             path.parent.mkdir(parents=True, exist_ok=True)
             with open(path, "ab") as file:
                 file.write(_line({"group": group, "rows": [values_of(row) for row in rows]}))
@@ -68,7 +68,7 @@ class KeptRows:
     def forget(self, sequence: str, method: str) -> None:
         """The rows of a method are to be made again."""
         path = self._path(sequence, method)
-        with writing(path):
+        with writing(path, THEN_RESUME):
             path.unlink()
 
     def about(self, sequence: str) -> dict[str, Any] | None:
@@ -86,7 +86,7 @@ class KeptRows:
 
     def finish(self, sequence: str, about: Mapping[str, Any]) -> None:
         """A sequence is done; `about` says for which methods."""
-        with writing(self.folder):
+        with writing(self.folder, THEN_RESUME):
             (self.folder / KEPT / sequence).mkdir(parents=True, exist_ok=True)
             with whole_file(self.folder / KEPT / sequence / ABOUT) as file:
                 file.write(_line(about))

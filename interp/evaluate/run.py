@@ -37,7 +37,7 @@ from vid2ev.cluster.task import Task, Tell, share_of
 from vid2ev.cluster.work import Share, outcomes
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
 from vid2ev.recording.manifest import versions
 from vid2ev.requests import is_whole
 from vid2ev.terminal import counted
@@ -128,7 +128,7 @@ def evaluate(
         for method in methods:
             prune(folder, method.name, rows)
         summary = _summary(job, found, methods, rows, about)
-        with writing(folder):
+        with writing(folder, THEN_RESUME):
             write_rows(folder / ROWS, rows)
             with whole_file(folder / SUMMARY) as file:
                 file.write(f"{json.dumps(summary, indent=1, allow_nan=False)}\n".encode())

@@ -16,7 +16,7 @@ import numpy as np
 
 from interp.evaluate.group import Group
 from interp.evaluate.row import Row
-from vid2ev.recording.disk import writing
+from vid2ev.recording.disk import THEN_RESUME, writing
 from vid2ev.recording.exposures import write_codes
 
 FOLDER = "worst"
@@ -71,7 +71,7 @@ class WorstPictures:
     def _write(self, row: Row, pictures: Sequence[np.ndarray]) -> None:
         for name, picture in zip(names_of(row).values(), pictures, strict=True):
             path = self._folder / name
-            with writing(path):
+            with writing(path, THEN_RESUME):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 write_codes(path, picture)
 

@@ -33,7 +33,7 @@ from interp.interpolate.pieces import Pieces
 from vid2ev.errors import DataError, Vid2evError
 from vid2ev.pictures.film import film_size, join_films, remarks_on_size
 from vid2ev.recording.destination import partial_of
-from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
 from vid2ev.recording.held import LOCK, Held, undisturbed
 from vid2ev.recording.manifest import difference, is_of_job, read_manifest, write_manifest
@@ -122,7 +122,7 @@ class Shelf:
 
     def writing(self) -> Any:
         """What goes wrong with the disk within becomes one sentence."""
-        return writing(self.output, REMEDY)
+        return writing(self.output, THEN_RESUME if self.done else REMEDY)
 
     def put(self, number: int, picture: np.ndarray) -> None:
         """A frame."""

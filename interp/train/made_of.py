@@ -32,7 +32,7 @@ from interp.train.job import EVENT_FED, Job
 from interp.train.learner import Learner
 from interp.train.schedule import Schedule
 from interp.train.true_flows import WithFlowBetween, WithFlows, with_flows
-from vid2ev.recording.disk import sync, writing
+from vid2ev.recording.disk import THEN_RESUME, sync, writing
 from vid2ev.sensors.devices import CPU, Device
 
 WITHOUT_END = 1 << 40  # samples
@@ -140,7 +140,7 @@ def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:
         if len(clips) == count:
             return clips
     clips = validation_clips(settings, job.validation.clips, job.validation.videos)
-    with writing(cache):
+    with writing(cache, THEN_RESUME):
         cache.mkdir(parents=True, exist_ok=True)
         whole.unlink(missing_ok=True)
         remove_half_written(cache)

@@ -14,6 +14,7 @@ from render_pools import pools_begun
 from rows_read import read_rows
 
 from interp.evaluate import run
+from interp.evaluate.kept import KeptRows
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.run import evaluate
 from interp.evaluate.simulated import Simulated
@@ -123,6 +124,17 @@ def test_a_finished_evaluation_is_left_as_it_is(
     found = evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
     assert contents(tmp_path / "report") == whole
     assert repr(read_rows(tmp_path / "report" / "rows.csv")) == repr(found.rows)  # (NaN is not equal to itself)
+
+
+def test_a_full_disk_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    kept = KeptRows(tmp_path)
+    for write in (lambda: kept.add("a", "bridge", 0, []), lambda: kept.finish("a", {})):
+        with pytest.raises(DataError, match=r"No space left on device; make room or access there, then --resume$"):
+            write()
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

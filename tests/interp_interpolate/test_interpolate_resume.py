@@ -123,6 +123,20 @@ def test_what_was_cut_off_in_writing_does_not_count(tmp_path: Path) -> None:
     assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
 
 
+def test_a_full_disk_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source, left = images(tmp_path / "in", moving(4)), iter(range(8))
+
+    def nearly_full(path: Path) -> None:
+        if next(left, None) is None:
+            raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(shelf, "sync", nearly_full)
+        with pytest.raises(DataError, match=r"No space left on device; make room or access there, then --resume$"):
+            interpolate(source, tmp_path / "out", multiple=3, method="linear")
+    assert interpolate(source, tmp_path / "out", multiple=3, method="linear", resume=True)["frames"] == 10
+
+
 def test_what_is_missing_of_what_was_made_is_named_and_nothing_is_published(tmp_path: Path) -> None:
     source = recording(tmp_path / "in", moving(6))
     killed(source, tmp_path / "out", 11)

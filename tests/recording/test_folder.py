@@ -66,6 +66,21 @@ def test_it_appears_as_a_whole(tmp_path: Path) -> None:
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["events.h5", "manifest.json"]
 
 
+def test_a_full_disk_says_how_to_go_on_where_there_is_something_to_go_on_with(tmp_path: Path) -> None:
+    for checkpoint, remedy in ((False, "or choose another folder with -o"), (True, "then --resume")):
+        with (
+            pytest.raises(
+                DataError, match=f"out cannot be written: No space left; make room or access there, {remedy}$"
+            ),
+            Folder(tmp_path / "out", JOB) as folder,
+        ):
+            if checkpoint:
+                folder.checkpoint({"level": np.arange(4.0)})
+            with folder.writing():
+                raise OSError(28, "No space left")
+        assert partial_of(tmp_path / "out").exists() == checkpoint
+
+
 def test_an_empty_folder_is_free(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with Folder(tmp_path / "out", JOB) as folder:

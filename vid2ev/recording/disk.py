@@ -18,6 +18,8 @@ import numpy as np
 from vid2ev.errors import DataError, DiskError, UsageError
 from vid2ev.recording.held import Held, undisturbed
 
+THEN_RESUME = "make room or access there, then --resume"  # where there is something to go on with
+
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:

@@ -31,7 +31,7 @@ import numpy as np
 from vid2ev.errors import DataError, SavedError, UsageError, Vid2evError
 from vid2ev.formats.eager import EagerFile
 from vid2ev.recording.destination import begun_at, check_apart, check_folder, partial_of
-from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, put_in_place, sync, whole_file, writing
 from vid2ev.recording.held import LOCK, Held, undisturbed
 from vid2ev.recording.manifest import is_of_job, read_manifest
 from vid2ev.terminal import counted
@@ -175,7 +175,8 @@ class Folder:
 
     def writing(self) -> AbstractContextManager[None]:
         """What goes wrong with the disk within becomes one sentence."""
-        return writing(self.directory, "make room or access there, or choose another folder with -o")
+        elsewhere = "make room or access there, or choose another folder with -o"
+        return writing(self.directory, THEN_RESUME if self.resumable else elsewhere)
 
     def _begin(self) -> None:
         """Take up the checkpoint, find the recording finished, or start."""

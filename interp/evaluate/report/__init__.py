@@ -13,7 +13,7 @@ from pathlib import Path
 from interp.evaluate.report.about import About
 from interp.evaluate.report.worst import WorstFrame
 from interp.evaluate.row import Row
-from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
 
 __all__ = ["MARKDOWN", "PAGE", "About", "WorstFrame", "write_report"]
 
@@ -31,7 +31,7 @@ def write_report(folder: Path, rows: Sequence[Row], about: About, worst: Sequenc
 
     said = document(rows, about, worst)
     for name, text in ((MARKDOWN, markdown(said)), (PAGE, page(said))):
-        with writing(folder / name):
+        with writing(folder / name, THEN_RESUME):
             folder.mkdir(parents=True, exist_ok=True)
             with whole_file(folder / name) as file:
                 file.write(text.encode())
