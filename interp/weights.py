@@ -10,12 +10,14 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 import torch
 from torch import nn
 
 from interp.blocks.frozen import Frozen
 from interp.networks import NETWORKS, make, spec_of
+from interp.pretrained import OF_RUN
 from vid2ev.errors import DataError, UsageError
 from vid2ev.untrusted import first_line, json_of
 
@@ -110,6 +112,10 @@ def _read(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
             metadata = file.metadata() or {}
             tensors = {_bare(key): file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
     except (OSError, SafetensorError) as error:
+        if is_zipfile(path):
+            raise DataError(
+                f"{path} is a checkpoint of torch, not weights in safetensors; give the run's folder, or {OF_RUN} in it"
+            ) from error
         raise DataError(f"{path} cannot be read as weights ({error}); give a file that training has written") from error
     name = metadata.get("network", "")
     try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 import zipfile
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import torch
@@ -17,11 +18,10 @@ from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
-from interp.train.run_folder import MAKE_ROOM
 from interp.train.schedule import MOST_STEPS
 from vid2ev.errors import DataError
-from vid2ev.recording.disk import whole_file, writing
-from vid2ev.untrusted import check_bytes
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
+from vid2ev.untrusted import check_bytes, first_line
 
 
 class WholeFiles(TorchCheckpointIO):
@@ -29,7 +29,7 @@ class WholeFiles(TorchCheckpointIO):
 
     def save_checkpoint(self, checkpoint: dict[str, Any], path: str | Path, storage_options: Any = None) -> None:
         """Write a checkpoint; raises DataError where that cannot be."""
-        with writing(Path(path), MAKE_ROOM), whole_file(Path(path)) as file:
+        with writing(Path(path), THEN_RESUME), whole_file(Path(path)) as file:
             try:
                 torch.save(checkpoint, file)
             except RuntimeError as error:  # (of the library, for whatever the disk says)
@@ -54,7 +54,9 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     except DataError:
         raise
     except Exception as error:  # (torch, its reader of plain data and zipfile have a dozen of their own)
-        reason = (str(error).strip().split("\n")[0] or type(error).__name__)[:200]
+        reason = first_line(error)
+        if isinstance(error, UnpicklingError):  # (torch says how to have it run what is in there)
+            reason = "it holds more than numbers and their names, which is not read"
         raise DataError(
             f"{path} is no whole checkpoint ({reason}); copy the run again, or start another with -o"
         ) from error

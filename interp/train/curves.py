@@ -15,9 +15,8 @@ from typing import Any
 from lightning.pytorch.loggers.logger import Logger
 from lightning.pytorch.utilities import rank_zero_only
 
-from interp.train.run_folder import MAKE_ROOM
 from vid2ev.errors import DataError
-from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
 
 FILES = {"train": "training.csv", "validation": "validation.csv"}
 
@@ -61,7 +60,7 @@ class Curves(Logger):
             self._write(name, [*(each for each in before if not again or each["step"] != row["step"]), row])
             return
         path = self.folder / name
-        with writing(path, MAKE_ROOM), open(path, "a", newline="", encoding="utf-8") as file:
+        with writing(path, THEN_RESUME), open(path, "a", newline="", encoding="utf-8") as file:
             csv.DictWriter(file, self._columns[name], lineterminator="\n").writerow(row)
 
     def _write(self, name: str, rows: list[dict[str, str]]) -> None:
@@ -69,7 +68,7 @@ class Curves(Logger):
         if not columns:
             (self.folder / name).unlink(missing_ok=True)
             return
-        with writing(self.folder / name, MAKE_ROOM), whole_file(self.folder / name) as raw:
+        with writing(self.folder / name, THEN_RESUME), whole_file(self.folder / name) as raw:
             lines = [columns, *([row.get(key, "") for key in columns] for row in rows)]
             raw.write("".join(",".join(line) + "\n" for line in lines).encode())
         self._columns[name] = columns

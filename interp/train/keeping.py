@@ -11,8 +11,8 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from interp import weights
 from interp.train.learner import Learner
 from interp.train.pictures import encoded
-from interp.train.run_folder import MAKE_ROOM, RunFolder
-from vid2ev.recording.disk import whole_file, writing
+from interp.train.run_folder import RunFolder
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
 
 
 class Keeping(Callback):
@@ -48,4 +48,4 @@ class Keeping(Callback):
                 weights.save(self.folder.weights, self.network, pl_module.network, {"step": str(trainer.global_step)})
 
     def _writing(self) -> Any:
-        return writing(self.folder.path, MAKE_ROOM)
+        return writing(self.folder.path, THEN_RESUME)

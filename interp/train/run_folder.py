@@ -33,14 +33,14 @@ from interp.pretrained import OF_RUN
 from interp.train.schedule import MOST_STEPS, Steps
 from interp.train.scores import Scores
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.disk import THEN_RESUME, whole_file, writing
 from vid2ev.recording.held import Held
 from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
 FINISHED, WENT_ON, CLIPS = "finished.json", "went_on_with", "clips"
-MAKE_ROOM = "make room or access there, then --resume"
+AGAIN = "remove it, and --resume makes it again"
 LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
 OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in it, which is removed in the end
 
@@ -79,12 +79,27 @@ class RunFolder:
     def finished(self) -> dict[str, Any] | None:
         """How it came out; None until it is done."""
         file = self.path / FINISHED
-        return read_json(file) if file.exists() else None
+        try:
+            return read_json(file) if file.exists() else None
+        except DataError as error:
+            raise DataError(f"{file} cannot be read; {AGAIN}") from error
 
     def check_weights(self) -> None:
-        """Raise DataError where those of the best validation have been removed, which nothing makes again."""
-        if self.first and not self.weights.exists():
+        """Raise DataError where those of the best validation have been removed or damaged, which nothing makes
+        again."""
+        from interp.weights import about
+
+        if not self.first:
+            return
+        if not self.weights.exists():
             raise DataError(f"{self.weights} is gone; put it back and --resume, or start another run with -o")
+        try:
+            about(self.weights)
+        except DataError as error:
+            raise DataError(
+                f"{self.weights} is damaged; put a copy that is whole in its place and --resume, or start another run"
+                " with -o"
+            ) from error
 
     def finish(self, outcome: Mapping[str, Any]) -> None:
         """Training is done: keep how it came out, and nothing that is needed to go on only."""
@@ -159,21 +174,19 @@ class RunFolder:
         file = self.path / "baselines.json"
         if not file.exists():
             return {}
-        found = read_json(file)
-        with as_stated(file):
+        try:
             tables = {
                 method: {
                     group: Scores(**{name: _number(value) for name, value in of.items()}) for group, of in table.items()
                 }
-                for method, table in found.items()
+                for method, table in read_json(file).items()
             }
+        except (DataError, TypeError, ValueError, AttributeError) as error:
+            raise DataError(f"{file} holds no scores that can be read; {AGAIN}") from error
         for table in tables.values():
             if set(table) != set(groups):
                 said, expected = (", ".join(dict.fromkeys(names))[:80] or "nothing" for names in (table, groups))
-                raise DataError(
-                    f"{file} has scores of {said}, expected {expected}: it is of another run; remove it, and --resume"
-                    " makes it again"
-                )
+                raise DataError(f"{file} has scores of {said}, expected {expected}: it is of another run; {AGAIN}")
         return tables
 
     def write_baselines(self, tables: Mapping[str, Any]) -> None:
@@ -205,7 +218,7 @@ class RunFolder:
 
     def _keep(self, name: str, content: Mapping[str, Any]) -> None:
         """Write what comes to be known while it trains."""
-        with writing(self.path / name, MAKE_ROOM):
+        with writing(self.path / name, THEN_RESUME):
             self._write(name, content)
 
     def _write(self, name: str, content: Mapping[str, Any]) -> None:

@@ -114,6 +114,8 @@ def test_what_is_not_weights_is_refused_in_a_sentence(tmp_path: Path) -> None:
         with pytest.raises(DataError, match=name) as refused:
             weights.load(tmp_path / name)
         assert "\n" not in str(refused.value)
+    with pytest.raises(DataError, match=r"is a checkpoint of torch, not weights in safetensors; give the run's folder"):
+        weights.load(tmp_path / "pickle")
 
 
 def test_a_disk_that_cannot_take_it_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

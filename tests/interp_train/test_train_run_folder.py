@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from interp import weights
+from interp.networks import make
 from interp.train.run_folder import RunFolder
 from interp.train.schedule import Steps
 from interp.train.scores import Scores
@@ -64,13 +67,35 @@ def test_what_is_no_plan_is_one_sentence(folder: RunFolder, said: Any) -> None:
         {"linear": {"videos": {"psnr": 30.0, "ssim": 1, "moving": None, "static": 30.0}}},
         {"linear": {"scenes": 3}},
         {"linear": {}},
+        {"linear": None},
+        [],
+        None,
     ],
 )
 def test_what_is_no_scores_of_these_clips_is_one_sentence(folder: RunFolder, said: Any) -> None:
-    (folder.path / "baselines.json").write_text(json.dumps(said))
-    with pytest.raises(DataError, match=r"baselines\.json ") as error:
+    """Also what is cut short: whatever it is, it can be measured again."""
+    (folder.path / "baselines.json").write_text(json.dumps(said) if said is not None else '{"linear": {"sc')
+    with pytest.raises(DataError, match=r"baselines\.json .*; remove it, and --resume makes it again$") as error:
         folder.baselines(["scenes", "scenes"])
     assert "\n" not in str(error.value)
+
+
+def test_how_a_run_came_out_can_be_found_again(folder: RunFolder) -> None:
+    folder.finish({"step": 7})
+    (folder.path / "finished.json").write_text('{"ste')
+    with pytest.raises(DataError, match=r"finished\.json cannot be read; remove it, and --resume makes it again$"):
+        folder.finished()
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_weights_that_were_damaged_are_no_result(folder: RunFolder, whole: bool) -> None:
+    weights.save(folder.weights, "firenet", make("firenet"))
+    if whole:
+        return folder.check_weights()
+    for length in (folder.weights.stat().st_size // 2, 0):
+        os.truncate(folder.weights, length)
+        with pytest.raises(DataError, match=r"weights\.safetensors is damaged; .* and --resume"):
+            folder.check_weights()
 
 
 @pytest.mark.parametrize("moving", [30.0, math.nan])
