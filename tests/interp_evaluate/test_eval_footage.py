@@ -172,6 +172,16 @@ def test_a_lens_without_a_size_is_one_sentence(tmp_path: Path) -> None:
         open_sequence(tmp_path / "own")
 
 
+@pytest.mark.parametrize("blur", [True, False])
+def test_key_frames_of_an_instant_were_not_exposed(tmp_path: Path, blur: bool) -> None:
+    write_film(tmp_path / "film.npz", pictures(12))
+    shutter = {"frame_rate_hz": 250.0, "exposure_us": 400.0, "blur": blur}
+    cameras = Camera(name="dvs", kind="dvs"), Camera(name="cis", kind="cis", sensor="paper", set=shutter)
+    convert(tmp_path / "film.npz", tmp_path / "own", rig=Rig(cameras=cameras), pictures="png", preview=False)
+    own = open_sequence(tmp_path / "own")
+    assert isinstance(own, Own) and own.exposure_us(0) == (400 if blur else 0)
+
+
 @pytest.mark.parametrize("late_us", [0, 400_000])
 def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path, late_us: int) -> None:
     """When the frames were taken, whatever the clock of the cameras says."""

@@ -58,6 +58,11 @@ class Own:
             for each in frames
             if each not in alike
         ]
+        self.remarks += [
+            f"its camera {each['name']} is left out: the events are those of {sent['name']}"
+            for each in events
+            if each is not sent
+        ]
         self.curve: str = keys["curve"]
         self._keys, self._frames = _Pictures(keys, self.curve), _Pictures(alike[-1], self.curve)
         self.keys_folder, self.events_folder = keys["folder"], sent["folder"]
@@ -109,7 +114,7 @@ class Own:
         return self._keys.rgb(self._key_of[k]) if k in self._key_of else self.frame(k)
 
     def exposure_us(self, k: int) -> float:
-        """How long the camera that took key frame k exposes a frame."""
+        """How long the camera that took key frame k exposes a frame; 0 of one that sees an instant."""
         return (self._keys if k in self._key_of else self._frames).exposure_us
 
     def looks(self, t_us: int) -> tuple[Look, ...]:
@@ -191,7 +196,9 @@ class _Pictures:
         raw = self._folder.name == KINDS["raw"]
         with as_stated(self._folder.parent / MANIFEST):
             self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
-            self.exposure_us = float(facts["numbers"]["exposure_us"])  # (of a row; all of them may take longer)
+            blurred = facts["numbers"].get("blur", True)
+            # (of a row; all of them may take longer)
+            self.exposure_us = float(facts["numbers"]["exposure_us"]) if blurred else 0.0
         if facts["curve"] != curve:
             by_curve = codes_of(light_of(facts["curve"]), curve)
             self._picture = by_curve if self._picture is None else by_curve[self._picture]
