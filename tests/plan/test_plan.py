@@ -70,6 +70,19 @@ def test_of_poles_the_first_does_not_go_without_the_second() -> None:
     assert plan_of(scene("edge"), POLES, 1.0, among=["follower"]).gone == ("follower",)
 
 
+@pytest.mark.parametrize("effects", ["auto", "bandwidth"])
+def test_a_bandwidth_goes_with_its_pole(effects: str) -> None:
+    """In light in which a pole of the bandwidth at light 1 is farther off than a delay in its place."""
+    spec = clean(photoreceptor_tau_us=100.0, bandwidth="light", bandwidth_dark=1.0, random_phase=True)
+    seen = scene_of(spec, (24, 16), ramps(size=(24, 16)))
+    first, second = (EFFECTS[name].omission(seen, spec).distance for name in ("photoreceptor", "bandwidth"))
+    assert first is not None and second is not None and first < second
+    plan = plan_of(seen, spec, 1.001 * first, effects)
+    assert plan.gone == ("photoreceptor", "bandwidth") and plan.spec.effects() == ["delay"] * (effects == "auto")
+    assert plan.rows[1].omission.why.endswith("; goes with the first pole")
+    assert plan.distance == (pytest.approx(first) if effects == "auto" else None)
+
+
 @pytest.mark.parametrize("size", [(64, 48), (27, 60)])
 def test_a_shading_is_looked_at_up_to_the_corners(size: tuple[int, int]) -> None:
     spec = clean(shading=(0.0, -0.5))

@@ -232,6 +232,10 @@ def _planned(
         kept = names_of(effects)
         gone = [name for name in used if name not in kept]
         changes = {key: value for name in gone for key, value in EFFECTS[name].off.items()}
+    if "photoreceptor" in gone and "bandwidth" in used:
+        gone = [*dict.fromkeys([*gone, "bandwidth"])]
+        said = omissions["bandwidth"]
+        omissions |= {"bandwidth": replace(said, why=f"{said.why}; goes with the first pole")}
     bounds = [omissions[name].distance for name in _counted(gone) if omissions[name].sure]
     distance = together(*bounds) if len(bounds) == len(_counted(gone)) else None  # type: ignore[arg-type]
     if effects != "auto" and {"photoreceptor", "follower", "delay"} & {*gone}:
@@ -287,8 +291,8 @@ def _within(omissions: dict[str, Omission], tolerance: float) -> list[str]:
 
 
 def _counted(gone: Sequence[str]) -> list[str]:
-    """Those whose bounds count: that of both poles has the second's in it."""
-    return [name for name in gone if name != "follower" or "photoreceptor" not in gone]
+    """Those whose bounds count: that of both poles has the second's in it, and that of the first's bandwidth."""
+    return [name for name in gone if name not in ("follower", "bandwidth") or "photoreceptor" not in gone]
 
 
 def _costs(name: str) -> bool:
