@@ -39,8 +39,8 @@ def event_options(contrast: str) -> Callable[..., Any]:
         ),
         click.option(
             "--refractory", "refractory_us", type=Finite(), metavar="US",
-            help="For how long a pixel is blind after an event: what it misses then is made good.  [default: as the"
-            " recording says, or else nothing is]",
+            help="For how long a pixel is blind after an event, 0 for not at all: what it misses then is made good."
+            "  [default: as the recording says, or else nothing is]",
         ),
     )  # fmt: skip
 
