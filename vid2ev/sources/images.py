@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,7 @@ from vid2ev.terminal import counted
 from vid2ev.untrusted import json_of, read_text
 
 TIMESTAMPS = "timestamps.txt"
-DEEPEST = 3  # folders below one that holds no images, in which some are looked for to be named
+DEEPEST, MOST = 3, 1000  # folders below one that holds no images, in which some are looked for to be named
 FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of frames that they have made
 
 
@@ -208,7 +208,7 @@ def _instead(folder: Path) -> str:
     held = [Path(source) for source in sources_in(str(folder))] if folder.is_dir() else []
     held = [path for path in held if path != folder][:1]
     folders = (path for depth in range(1, DEEPEST + 1) for path in sorted(folder.glob("*/" * depth)))
-    below = (path for path in folders if sources_in(str(path)) != [str(path)])
+    below = (path for path in islice(folders, MOST) if sources_in(str(path)) != [str(path)])
     events = any(path.is_file() and recognise(path) for path in held)
     for kind, first in (
         ("event files" if events else "videos or folders of images", next(iter(held), None)),
