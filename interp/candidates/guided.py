@@ -16,9 +16,10 @@ motion of D is sought between two frames, and goes evenly from one to the other.
 J is free of the noise of events, C right where nothing in the key frames is, and I is nearer than either: the best mix
 of two pictures whose errors have nothing to do with each other, as Wiener's filter is.  c^2 is the mean squared error
 of C, of what the key frames show that events missed (`ramps.in_doubt`); and e^2, of J and C apart, is c^2 + j^2.
-So J counts where C is in doubt, or both agree, and C where it is certain and J is not: flicker, smoke, what comes into
-view.  Motion counts where it explains light better than standing still does (`vid2ev.upsample.motion.convincing`), so
-what stands still stays as it is.
+That is of means around a pixel.  But a lone event of noise is in one pixel, so there c^2 is the largest of what is
+missed in it, next to it, and around.  So J counts where C is in doubt, or both agree, and C where it is certain and J
+is not: flicker, smoke, what comes into view.  Motion counts where it explains light better than standing still does
+(`vid2ev.upsample.motion.convincing`), so what stands still stays as it is.
 
 Where a pixel of the event camera looks at k x k pixels of the frames, C has luminance averaged over them and nothing
 finer.  So F and e are of luminance averaged alike, and c^2 in j^2 = e^2 - c^2 of doubts averaged alike, while c^2
@@ -185,15 +186,15 @@ def nearer(
 
 @in_full_precision
 def off_by(shown: torch.Tensor, doubt: torch.Tensor, footprint: int = 1) -> tuple[torch.Tensor, torch.Tensor]:
-    """c^2, mean squared errors of pictures in codes, [B, N, 1, H, W]; and of these averaged alike.
+    """c^2, mean squared errors of pictures in codes, [B, N, 1, H, W]: the largest of a pixel's, of those next to it,
+    and of those around; and of pictures averaged alike, those around.
 
     doubt   how far their light may be off [B, N, 1, H, W] nat
     """
     per_nat = (shown.clamp(min=DARKEST) / GAMMA) ** 2
-    wrong = per_nat * _around(doubt**2, DOUBT_PX, footprint)
-    if footprint == 1:
-        return wrong, wrong
-    return wrong, per_nat * _around(averaged(doubt, footprint) ** 2, DOUBT_PX, footprint)
+    wrong = [_around(doubt**2, across_px, footprint) for across_px in (1, AROUND_PX, DOUBT_PX)]
+    seen_wrong = wrong[-1] if footprint == 1 else _around(averaged(doubt, footprint) ** 2, DOUBT_PX, footprint)
+    return per_nat * torch.stack(wrong).amax(0), per_nat * seen_wrong
 
 
 @in_full_precision

@@ -102,8 +102,8 @@ def test_colours_go_from_those_of_the_one_frame_to_those_of_the_other_as_the_dri
     lights = [torch.tensor(each).reshape(1, 3, 1, 1) for each in ((0.3, 0.1, 0.2), (0.5, 0.7, 0.6))]
     first, second = ((each + 0.01) / (luminance(each) + 0.01) for each in lights)
     found = method(*lights, EventCounts(off_on, torch.full((1, 2), 0.01)), torch.tensor([[0.75]]), "linear")[:, 0]
-    # (ramps are on the way to the first event, which counts half and comes in the middle of a sub-interval)
-    drift = 1.5 / (20 + 2) if method is bridge else (0.5 * (0.75 / 0.8125) ** 2 + 1.5) / (19.5 + 2)
+    # (ramps are on the way to the first event, half of which is before it, in the middle of a sub-interval)
+    drift = 1.5 / (20 + 2) if method is bridge else (0.5 * (0.75 / 0.8125) ** 2 + 1.5) / (20 + 2)
     made = (found + 0.01) / (luminance(found) + 0.01)
     torch.testing.assert_close(made, first + drift * (second - first), rtol=1e-4, atol=0)
 

@@ -178,6 +178,19 @@ def test_what_is_certain_is_kept_and_what_agrees_is_carried() -> None:
     assert float(share_of(apart, target, doubted).max()) < 0.03
 
 
+def test_a_pixel_with_an_event_of_noise_is_carried_and_those_around_it_are_as_sure_as_before() -> None:
+    """One that tells what no key frame knows, where all others agree: the doubt is its own."""
+    target, doubt = torch.full((1, 1, 1, 41, 41), 0.5), torch.full((1, 1, 1, 41, 41), 0.01)
+    lone = doubt.clone()
+    lone[..., 20, 20] = 0.2
+    noisy = target.clone()
+    noisy[..., 20, 20] += 0.05
+    agreed = agreement(target[:, :, None], shown_of(noisy))
+    before, after = (share_of(agreed, noisy, each) for each in (doubt, lone))
+    assert float(before[0, 0, 0, 20, 20]) < 0.5 < 0.95 < float(after[0, 0, 0, 20, 20])
+    torch.testing.assert_close(after[0, 0, 0, 0], before[0, 0, 0, 0])
+
+
 def test_light_of_coarse_pixels_is_in_doubt_by_what_it_does_not_show() -> None:
     target = torch.full((1, 1, 1, 60, 60), 0.5)
     stripes = 0.3 * (torch.arange(60) % 2 * 2 - 1.0).expand_as(target)  # as fine as pixels: nothing is left of 2 x 2
@@ -225,7 +238,8 @@ def test_what_is_off_and_what_is_believed_is_as_the_docstring_has_it(k: int) -> 
 
     logits = [-SHARP / k**0.5 * around(np.abs(alike(each - picture)), AROUND_PX) for each in carried]
     per_nat = (np.maximum(picture, DARKEST) / GAMMA) ** 2  # code ~ light ** (1 / GAMMA), as light is seen
-    wrong, seen_wrong = per_nat * around(doubt**2, DOUBT_PX), per_nat * around(alike(doubt) ** 2, DOUBT_PX)
+    wrong = per_nat * np.max([around(doubt**2, each) for each in (1, AROUND_PX, DOUBT_PX)], axis=0)
+    seen_wrong = per_nat * around(alike(doubt) ** 2, DOUBT_PX)
     apart = math.pi / 2 * (np.maximum(*logits) / SHARP) ** 2 * k
     off = np.maximum(apart - seen_wrong, 0)
     seen, both, doubts = (

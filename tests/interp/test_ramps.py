@@ -43,8 +43,12 @@ def slowly(off_on: np.ndarray, contrast: tuple[float, float], t: float) -> tuple
             change, number, last = change + v * nats, number + v, at
             continue
         way = (t - last) / (at - last)
-        return change + way**2 * v * nats, number + way**2 * v
-    return change, number
+        gone = way**2 if k == 0 else way
+        return change + gone * v * nats, number + gone * v
+    if not events:
+        return 0.0, 0.0
+    after = 0.5 * (1 - ((1 - t) / (1 - last)) ** 2)
+    return change + after * events[-1][1], number + after
 
 
 @settings(max_examples=60)
@@ -80,12 +84,12 @@ def test_without_events_it_is_the_bridge() -> None:
 
 def test_a_lone_event_of_noise_is_a_hump_of_half_its_height() -> None:
     key = torch.full((1, 1, 1, 1), 0.5)
-    times = torch.tensor([[0.5 / STEPS, 3.499 / STEPS, 3.501 / STEPS]])
+    times = torch.tensor([[0.5 / STEPS, 3.499 / STEPS, 3.501 / STEPS, 6.0 / STEPS]])
     made = ramps(key, key, of_one_pixel([0, 0, 0, 1, 0, 0, 0, 0]), times)
     logs = torch.log(luminance(to_light(made, "srgb")) + DARK).flatten() - math.log(float(to_light(key, "srgb")) + DARK)
-    # w before and after the event: of 0.5 events and 2 more that are spread evenly
-    weight = [(n + 2 * float(t)) / 2.5 for n, t in zip((0.5 * (0.5 / 3.5) ** 2, 0.5, 0.5), times[0], strict=True)]
-    expected = [C * (n - 0.5 * w) for n, w in zip((0.5 * (0.5 / 3.5) ** 2, 0.5, 0.5), weight, strict=True)]
+    risen_by = [0.5 * (0.5 / 3.5) ** 2, 0.5, 0.5, 1 - 0.5 * (2 / 4.5) ** 2]  # of the event
+    weights = [(n + 2 * float(t)) / 3 for n, t in zip(risen_by, times[0], strict=True)]  # of it, and 2 spread evenly
+    expected = [C * (n - w) for n, w in zip(risen_by, weights, strict=True)]
     torch.testing.assert_close(logs, torch.tensor(expected), atol=1e-3, rtol=0)
     assert float(logs.abs().max()) < 0.5 * C
 
@@ -94,10 +98,47 @@ def test_doubt_is_what_is_missed_where_half_of_it_may_have_come() -> None:
     dark, bright = (torch.full((1, 1, 1, 1), light) for light in (0.1, 0.3))
     times = torch.tensor([[0.0, 0.25, 0.75, 1.0]])
     doubt = in_doubt(dark, bright, risen(of_one_pixel([0, 0, 0, 1, 0, 0, 0, 0]), times), times, "linear").flatten()
-    missed = math.log(0.301 / 0.101) - 0.5 * C  # a first event is half of one
-    early = (0.5 * (0.25 / 0.4375) ** 2 + 2 * 0.25) / 2.5  # w before the event, in the middle of 3/8 ... 4/8
-    expected = [0.0, missed * math.sqrt(early * (1 - early)), missed * 0.4, 0.0]  # w = 0.8 after it: sqrt(0.8 0.2)
+    missed = math.log(0.301 / 0.101) - C  # half the event before it, half after
+    early = (0.5 * (0.25 / 0.4375) ** 2 + 2 * 0.25) / 3  # w before the event, in the middle of 3/8 ... 4/8
+    late = (1 - 0.5 * (0.25 / 0.5625) ** 2 + 2 * 0.75) / 3
+    expected = [0.0, *(missed * math.sqrt(w * (1 - w)) for w in (early, late)), 0.0]
     torch.testing.assert_close(doubt, torch.tensor(expected), atol=1e-5, rtol=0)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.floats(0, 1))
+def test_backwards_in_time_it_is_the_same(seed: int, t: float) -> None:
+    """Of light that only rises, or falls: what has risen until t is then left of what falls.
+
+    (Light that turns goes a whole threshold back to the level before, forwards and backwards not the same one.)
+    """
+    draw = np.random.default_rng(seed)
+    falls = torch.from_numpy(draw.random((3, 4)) < 0.5)
+    some = torch.from_numpy(draw.poisson(draw.uniform(0.05, 1), (STEPS, 3, 4)))
+    off_on = torch.stack([some * falls, some * ~falls])[None]
+    t = (math.floor(t * STEPS * 4) + 0.5) / (STEPS * 4 + 1)
+    one = torch.full((1, 2), C)
+    there = risen(EventCounts(off_on, one), torch.tensor([[t]]))
+    back = risen(EventCounts(off_on.flip(1, 2), one), torch.tensor([[1 - t]]))
+    for name, reverse in (("change", "left"), ("number", "more")):
+        sign = -1 if name == "change" else 1
+        torch.testing.assert_close(getattr(there, name), sign * getattr(back, reverse), atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("thresholds", [0.4, 1.0, 2.5, 6.3])
+def test_light_that_changes_slowly_is_neither_ahead_nor_behind(thresholds: float) -> None:
+    """Straight in the logarithm, over all phases of the levels: the mean is the truth to a thirtieth of a threshold."""
+    steps, phases, rise = 64, 200, thresholds * C
+    at = (np.arange(phases) + 0.5) / phases + np.linspace(0, thresholds, steps + 1)[:, None]
+    on = torch.from_numpy(np.diff(np.floor(at), axis=0))
+    off_on = torch.stack([torch.zeros_like(on), on])[None, :, :, None]
+    times = torch.linspace(0.02, 0.98, 25)[None]
+    found = risen(EventCounts(off_on, torch.full((1, 2), C)), times)
+    zero = torch.zeros(1, 1, 1, 1, phases)
+    light = found.change + found.drift(times) * found.missed(zero, zero + rise)
+    off = light.mean((0, 2, 3, 4)) - rise * times[0]
+    assert float(off.abs().max()) < 0.03 * C
+    torch.testing.assert_close(off, -off.flip(0), atol=0.02 * C, rtol=0)  # as much ahead as behind
 
 
 def test_networks_are_given_thirds_of_usual_events_and_half_the_log_of_their_number() -> None:
