@@ -6,10 +6,12 @@ import itertools
 import json
 import math
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ from vid2ev.cost.measure import Cost, measured
 from vid2ev.cost.passes import Float64Dvs, run
 from vid2ev.cost.plot import label, plot
 from vid2ev.cost.rung import Rung
-from vid2ev.cost.stretch import beginning_of, stretch_of
+from vid2ev.cost.stretch import beginning_of, seen_stretch, stretch_of
 from vid2ev.cost.table import cells, recommendation, stretch_in_words, table
 from vid2ev.errors import UsageError
 from vid2ev.seen.recipe import Recipe
@@ -259,7 +261,7 @@ def test_a_single_frame_is_refused_with_what_to_do(tmp_path: Path) -> None:
 
 
 def test_settings_are_tried_where_there_are_pictures(tmp_path: Path) -> None:
-    """At the beginning, where nothing is in the middle, as of a screen that waits."""
+    """After the middle, where nothing is in it, as of a screen that waits; at the beginning, where nothing comes."""
     times_s = [*np.arange(40) / 30, *(8 + np.arange(40) / 30)]
     (tmp_path / "screen").mkdir()
     for k in range(len(times_s)):
@@ -267,7 +269,37 @@ def test_settings_are_tried_where_there_are_pictures(tmp_path: Path) -> None:
     (tmp_path / "screen" / "timestamps.txt").write_text("\n".join(f"{t:.6f}" for t in times_s))
     given = SIMPLE | {"fps": None, "upsample": "none", "given": ("upsample",)}
     found = measured(str(tmp_path / "screen"), clock=ticks(), **given)
+    assert found.stretch_s == pytest.approx((8, 8 + 29 / 30), abs=1e-6) and found.reference.events > 0
+    (tmp_path / "screen" / "timestamps.txt").write_text("\n".join(f"{t:.6f}" for t in [*times_s[:-1], 60.0]))
+    found = measured(str(tmp_path / "screen"), clock=ticks(), **given)
     assert found.stretch_s == pytest.approx((0.0, 1.0), abs=1e-6) and found.reference.events > 0
+
+
+@pytest.mark.parametrize("options", [{}, {"slowdown": 4.0}])
+@pytest.mark.parametrize(
+    ("times_s", "expected"),
+    [
+        pytest.param([*range(6), *(6 + np.arange(480) / 240), *range(8, 15)], 30, id="fast in the middle"),
+        pytest.param([*(np.arange(60) / 30), *range(2, 12), *(12 + np.arange(60) / 30)], 8, id="slow in the middle"),
+    ],
+)
+def test_as_many_pictures_are_taken_as_there_are_whatever_a_header_claims(
+    tmp_path: Path, times_s: list[float], expected: int, options: dict[str, Any]
+) -> None:
+    """Of a clip whose times are uneven its rate is a mean, or what its container claims."""
+    path = tmp_path / "uneven.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30, width=32, height=32, pix_fmt="yuv420p")
+        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
+        for time_s in times_s:
+            picture = av.VideoFrame(32, 32, "yuv420p")
+            picture.pts, picture.time_base = round(1000 * time_s), stream.time_base
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+    asked: dict[str, Any] = {"video": str(path), "sensor": "ideal"} | options
+    begin, end = seen_stretch(Recipe.of(**asked), asked)
+    assert begin is not None and end is not None and begin > 2
+    assert len([t for t in times_s if begin - 2e-3 <= t <= end + 2e-3]) == expected
 
 
 def test_the_reference_draws_the_noise_that_is_drawn_in_a_stretch_from_the_middle(clip: str) -> None:

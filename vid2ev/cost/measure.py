@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from vid2ev.cost.ladder import Given, Ladder, ladder_of, steps_of
 from vid2ev.cost.passes import run
 from vid2ev.cost.quality import Quality, interpolated, triples_of
 from vid2ev.cost.rung import Rung
-from vid2ev.cost.stretch import FRAMES, Stretch, beginning_of, stretch_of
+from vid2ev.cost.stretch import FRAMES, Stretch, seen_stretch
 from vid2ev.cost.turns import Report, Turns
-from vid2ev.errors import UsageError, Vid2evError
+from vid2ev.errors import UsageError
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.recording.manifest import machine
 from vid2ev.seen.recipe import Recipe
@@ -125,9 +124,7 @@ def measured(
         limits.check({mount.kind for mount in asked.mounts})
     if not asked.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be converted many times over; give a file")
-    stretch = stretch_of(asked, options, duration_s, frames)
-    if not _moves({**options, "start": stretch[0], "stop": stretch[1]}):
-        stretch = beginning_of(asked, options, duration_s, frames)
+    stretch = seen_stretch(asked, _of_recipe(options), duration_s, frames)
     options |= dict(zip(("start", "stop"), stretch, strict=True))
     recipe = Recipe.of(**_of_recipe(options))
     explicit, steps = Given(options, given), 1
@@ -149,15 +146,6 @@ def measured(
         limits or Budget.parse(DEFAULT if any(mount.kind == "dvs" for mount in recipe.mounts) else DEFAULT_OF_FRAMES),
         tuple(recipe.source.warnings),
     )
-
-
-def _moves(options: Mapping[str, Any]) -> bool:
-    """Whether there are two pictures in a part of a clip: the middle of one that is cut short, or waits there, has
-    none."""
-    try:
-        return sum(1 for _ in islice(Recipe.of(**_of_recipe(options)).source.frames(), 2)) == 2
-    except Vid2evError:
-        return False
 
 
 def _rows(
