@@ -379,6 +379,31 @@ def test_a_table_in_another_order_says_which_one_is_read(tmp_path: Path, kind: s
         list(read_events(path))
 
 
+@pytest.mark.parametrize("order", ["xytp", "xypt", "ytxp"])
+def test_a_table_in_another_order_is_known_by_the_column_that_never_goes_back(tmp_path: Path, order: str) -> None:
+    """Where all times could be those of rows."""
+    events = events_of(np.arange(1, 200) * 101, (640, 480))
+    table = np.stack([getattr(events, name) for name in order], axis=1).astype(np.int64)
+    np.save(tmp_path / "a.npy", table)
+    np.savetxt(tmp_path / "a.txt", table, "%d")
+    for name in ("a.npy", "a.txt") if order.endswith("p") else ("a.npy",):
+        with pytest.raises(DataError, match=r"never goes back, .*; save it with the columns t, x, y, p, in this order"):
+            list(read_events(tmp_path / name))
+
+
+@pytest.mark.parametrize("kind", ["sideways", "late"])
+def test_a_table_in_order_is_read_wherever_its_events_go(tmp_path: Path, kind: str) -> None:
+    """Along a row, or with some that come late."""
+    events = events_of(np.arange(1, 200) * 101, (640, 480))
+    t = events.t.copy()
+    t[50::50] -= 300
+    table = np.stack([t if kind == "late" else events.t, np.arange(199), events.y, events.p], axis=1)
+    np.save(tmp_path / "a.npy", table)
+    np.savetxt(tmp_path / "a.txt", table, "%d")
+    for name in ("a.npy", "a.txt"):
+        assert len(Events.concatenate(read_events(tmp_path / name))) == 199
+
+
 def test_numpy_and_h5py_read_what_is_written(tmp_path: Path) -> None:
     recording = dense()
     events = all_events(recording)

@@ -8,6 +8,8 @@ import numpy as np
 
 from vid2ev.errors import DataError
 
+FEWEST, BACK = 16, 8  # events of a table that say something of its order; of so many steps of its times one goes back
+
 
 def whole_us(path: Path, t: np.ndarray, from_us: int = 0) -> np.ndarray:
     """Times that are stored in microseconds after from_us, as int64.
@@ -47,6 +49,19 @@ def pixels(
             f"{path} has columns or rows that are not within 0 ... 65535; {other_order or 'get another copy'}"
         )
     return x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8)
+
+
+def check_order(path: Path, t: np.ndarray, **others: np.ndarray) -> None:
+    """Raise DataError where the times of a table that names no columns are in another of them: those taken for times go
+    back again and again, and another column never does."""
+    if len(t) < FEWEST or np.count_nonzero(t[1:] < t[:-1]) * BACK < len(t):
+        return
+    for name, values in others.items():
+        if values[-1] > values[0] + 1 and np.all(values[1:] >= values[:-1]):
+            raise DataError(
+                f"{path} seems to have its times where {name} is expected: this column never goes back, and that of t"
+                " does; save it with the columns t, x, y, p, in this order"
+            )
 
 
 def saved_as_arrays(path: Path, reader: str) -> str:

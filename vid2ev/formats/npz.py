@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, read_as
-from vid2ev.formats.columns import labels, pixels, whole_us
+from vid2ev.formats.columns import check_order, labels, pixels, whole_us
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array, open_columns
 from vid2ev.formats.sequential import Sequential, reading
@@ -77,6 +77,8 @@ class NpzEvents(Sequential):
             for at in range(0, count, step):
                 parts = {key: array.read(min(step, count - at)) for key, array in files.items()}
                 column = {name: _take(parts[id(array)], key) for name, (array, key) in columns.items()}
+                if not at and not self._named:
+                    check_order(self.path, **{name: column[name] for name in COLUMNS})
                 events, left = self._inside(self._events(column))
                 outside += left
                 yield events

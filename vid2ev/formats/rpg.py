@@ -11,12 +11,15 @@ Sources: https://github.com/uzh-rpg/rpg_e2vid; https://rpg.ifi.uzh.ch/davis_data
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from vid2ev.errors import DataError
+from vid2ev.formats.columns import check_order
 from vid2ev.formats.event_file import HEAD, Format, Recording
 from vid2ev.formats.sequential import reading
 from vid2ev.formats.text import FIELDS, TextEvents, write_lines
+from vid2ev.stream.events import Events
 
 COMMENTS = re.compile(rb"(?:\xef\xbb\xbf)?(?:[#%][\t\x20-\x7e]{0,1000}\r?\n)*")
 SIZE = re.compile(rb"[ \t]*([1-9]\d{0,4})[ \t]+([1-9]\d{0,4})[ \t]*(?:\r?\n|$)")
@@ -41,6 +44,12 @@ class RpgEvents(TextEvents):
         self.size = (int(size[1]), int(size[2])) if size else None
         if not seconds and EVENT.match(head, size.end() if size else begin):
             self.warnings.append("times have no decimals; they are taken for microseconds")
+
+    def _decoded(self) -> Iterator[Events]:
+        for number, events in enumerate(super()._decoded()):
+            if not number:
+                check_order(self.path, events.t, x=events.x, y=events.y)
+            yield events
 
 
 def write_events(path: Path, recording: Recording) -> None:
