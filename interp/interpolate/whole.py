@@ -88,8 +88,6 @@ def interpolate(
     take, grid, fill = ready.take, ready.grid, ready.fill
     if overwrite:
         check_apart(source, output)
-    if told:
-        told(f"{fill.method.name}: {ready.why}")
     rate = film_rate(take, grid, play, kind)
     pictures = Pictures(kind, take.bits, take.curve if kind == "mp4" else take.coded)
     job = {
@@ -109,6 +107,8 @@ def interpolate(
     with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write, line=LINE) as shelf:
         if shelf.finished:
             return shelf.finished
+        if told:
+            told(f"{fill.method.name}: {ready.why}")
         started, there = time.perf_counter(), shelf.count
         _fill(shelf, ready, pictures, report)
         seconds = time.perf_counter() - started

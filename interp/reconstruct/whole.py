@@ -99,8 +99,6 @@ def reconstruct(
     where = device_of(device)
     plain, why, about = _choice(network, cutoff_hz, size, stands_for, where)
     made_by = MadeGood(plain, sensor.dead_time, size) if sensor.dead_time else plain
-    if told:
-        told(f"{made_by.name}: {why}")
     rate = checked_play(play, kind) or (
         Fraction(FPS) if isinstance(slicing, Count) else rate_of_film(10**6 / slicing.us)
     )
@@ -124,6 +122,8 @@ def reconstruct(
     with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write) as shelf:
         if shelf.finished:
             return shelf.finished
+        if told:
+            told(f"{made_by.name}: {why}")
         started, there = time.perf_counter(), shelf.count
         _make(shelf, made_by, recording, slicing, pictures, report)
         seconds = time.perf_counter() - started

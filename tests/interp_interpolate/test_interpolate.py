@@ -291,6 +291,9 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
     said: list[str] = []
     interpolate(images(tmp_path / "a", moving(2)), tmp_path / "out", multiple=1, told=said.append)
     interpolate(recording(tmp_path / "b", moving(2)), tmp_path / "out2", multiple=1, told=said.append)
+    with pytest.raises(UsageError, match="out exists"):
+        interpolate(tmp_path / "a", tmp_path / "out", multiple=1, told=said.append)
+    interpolate(tmp_path / "a", tmp_path / "out", multiple=1, told=said.append, resume=True)  # (is there)
     weights = pretrained.first(pretrained.WITH_EVENTS)
     assert weights
     for sentence, name in zip(said, ("flow", weights.stem), strict=True):

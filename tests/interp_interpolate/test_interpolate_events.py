@@ -512,6 +512,7 @@ def test_a_recording_that_cannot_be_interpolated_says_what_it_lacks(tmp_path: Pa
             {"frame_camera": True, "pictures": ["mp4"]},
             "in a film alone.* convert its video with --cis-out raw$",
         ),
+        ("inside", {"formats": ["csv", "aedat4"]}, r"without frames of a frame camera; give .*inside/events\.aedat4,"),
         ("frames", {"rig": rig, "pictures": ["png"]}, "of frames alone.* with an event camera"),
     ):
         convert(source, tmp_path / name, preview=False, threads=1, **options)

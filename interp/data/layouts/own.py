@@ -21,7 +21,7 @@ from interp.representation.carried import Look
 from interp.representation.dead_time import DeadTime
 from interp.representation.event_counts import contrast_of
 from vid2ev import CisSpec, DataError, UsageError, read_events
-from vid2ev.formats import open_events
+from vid2ev.formats import open_events, recognise
 from vid2ev.recording.exposures import KINDS, LATEST_US, TIMESTAMPS, read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 
@@ -140,7 +140,17 @@ def _lack(folder: Path, events: bool) -> str:
         return "a recording of frames alone; convert its video with an event camera in the rig, or without a rig"
     if any(folder.glob(f"*/{KINDS['mp4']}")):
         return "its frames are in a film alone, which has not their times; convert its video with --cis-out raw"
+    files = sorted(path for held in ("events.*", "*/events.*") for path in folder.glob(held) if path.is_file())
+    with_frames = (path for path in files if "frames" in _kept_in(path))
+    if file := next(with_frames, None):
+        return f"a recording without frames of a frame camera; give {file}, which has frames of its source"
     return "a recording without frames; convert its video with --frames"
+
+
+def _kept_in(path: Path) -> frozenset[str]:
+    """What an event file may have beside its events."""
+    kind = recognise(path)
+    return frozenset() if kind is None else kind.keeps
 
 
 def _check_events(folder: Path) -> None:
