@@ -389,7 +389,12 @@ def test_a_folder_of_videos_or_of_pictures_is_as_these_by_themselves(tmp_path: P
     said = f"note: not used: recordings: 1 video beside its recordings; give --data {Path('recordings', 'a.npz')}, too"
     assert both.exit_code == 0 and said in both.output, both.output
     Path("recordings/a.npz").unlink()
-    assert "nothing: no recordings in it" in run(*small, "--data", "nothing").output
+    assert "nothing: no recordings in it; expected some of" in run(*small, "--data", "nothing").output
+    (tmp_path / "deep" / "a").mkdir(parents=True)
+    np.savez(tmp_path / "deep" / "a" / "a.npz", frames=light, fps=30)
+    refused = run(*small, "--data", "deep")
+    said = f"deep: no recordings in it; give one of the folders of clips in it, such as {Path('deep', 'a')}\n"
+    assert refused.exit_code == 2 and said in refused.output
     for asked in ("nothing", "recordings"):
         refused = run(*small, "--validate", asked)
         assert refused.exit_code == 2 and f"--validate {asked}: expected a video, or a folder of v" in refused.output

@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import islice, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
 from vid2ev.rig.lens_file import lens_in
-from vid2ev.sources.many import sources_in
+from vid2ev.sources.many import clips_below, sources_in
 from vid2ev.sources.times import (
     OF_ERGB,
     Clock,
@@ -48,7 +48,6 @@ from vid2ev.terminal import counted
 from vid2ev.untrusted import json_of, read_text
 
 TIMESTAMPS = "timestamps.txt"
-DEEPEST, MOST = 3, 1000  # folders below one that holds no images, in which some are looked for to be named
 FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of frames that they have made
 
 
@@ -207,13 +206,11 @@ def _instead(folder: Path) -> str:
     """What to give in place of a folder without pictures."""
     held = [Path(source) for source in sources_in(str(folder))] if folder.is_dir() else []
     held = [path for path in held if path != folder][:1]
-    folders = (path for depth in range(1, DEEPEST + 1) for path in sorted(folder.glob("*/" * depth)))
-    below = (path for path in islice(folders, MOST) if sources_in(str(path)) != [str(path)])
     events = any(path.is_file() and recognise(path) for path in held)
     for kind, first in (
         ("event files" if events else "videos or folders of images", next(iter(held), None)),
         ("recordings", next((path.parent for path in sorted(folder.glob("*/manifest.json"))), None)),
-        ("folders of clips", next(below, None)),
+        ("folders of clips", clips_below(folder)),
     ):
         if first is not None:
             return f"give one of the {kind} in it, such as {first}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import islice
 from pathlib import Path
 
 from vid2ev.errors import UsageError
@@ -18,6 +19,8 @@ CLIPS = {
     *MOTION_JPEG_SUFFIXES, ".npy", ".npz",
 }  # fmt: skip
 ARRAYS = {".npy", ".npz"}
+
+DEEPEST, MOST = 3, 1000  # folders below one without clips, in which some are looked for to be named
 
 LIST = ".txt"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # marks before a text that has zeros (and is refused as what it is)
@@ -47,6 +50,12 @@ def sources_in(video: str) -> list[str]:
     folders = [path for path in held if _may_be_read(path) and holds_pictures(path) and not is_recording(path)]
     found = sorted(clips + folders, key=lambda path: natural(path.name))
     return [str(path) for path in found] or [video]
+
+
+def clips_below(folder: Path) -> Path | None:
+    """The first folder below one that stands for clips, if there is one not far below."""
+    folders = (path for depth in range(1, DEEPEST + 1) for path in sorted(folder.glob("*/" * depth)))
+    return next((path for path in islice(folders, MOST) if sources_in(str(path)) != [str(path)]), None)
 
 
 def _is_clip(path: Path) -> bool:

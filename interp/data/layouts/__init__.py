@@ -11,6 +11,7 @@ from interp.data.layouts.ergb import LAYOUTS, STAMPS, Ergb, Names
 from interp.data.layouts.own import MANIFEST, Own
 from interp.data.layouts.sequence import Placed, Sequence, Windows, windows
 from vid2ev.errors import DataError, UsageError
+from vid2ev.sources.many import clips_below
 
 __all__ = [
     "Placed",
@@ -73,7 +74,10 @@ def opened_in(folder: str | Path) -> tuple[list[Sequence], dict[str, str]]:
         except DataError as error:
             unusable[str(path)] = str(error)
     if not found and not unusable:
-        raise UsageError(f"{folder}: no recordings in it; expected some of vid2ev, HS-ERGB or BS-ERGB")
+        below = clips_below(Path(folder))
+        remedy = "expected some of vid2ev, HS-ERGB or BS-ERGB"
+        remedy = f"give one of the folders of clips in it, such as {below}" if below else remedy
+        raise UsageError(f"{folder}: no recordings in it; {remedy}")
     return found, unusable
 
 
