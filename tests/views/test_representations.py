@@ -247,6 +247,20 @@ def test_events_outside_of_the_sensor_are_refused(text: str, x: int, y: int) -> 
         parse_representation(text)(SIZE).add(outside, 0, 10)
 
 
+@pytest.mark.parametrize("text", TEXTS)
+def test_arrays_that_differ_in_length_or_point_before_the_first_pixel_are_refused(text: str) -> None:
+    """Compiled code would read beyond the shorter ones, and count the others at the far edge."""
+    whole = {"t": np.arange(5), "x": np.zeros(5, int), "y": np.zeros(5, int), "p": np.ones(5, int)}
+    view = parse_representation(text)(SIZE)
+    for name, array in whole.items():
+        with pytest.raises(ValueError, match="expected one length"):
+            view.add(Events(**whole | {name: array[:3]}), 0, 10)
+    for name in "xy":
+        with pytest.raises(ValueError, match="outside of the 20x14 sensor"):
+            view.add(Events(**whole | {name: whole[name] - 1}), 0, 10)
+    np.testing.assert_array_equal(view.take(10), parse_representation(text)(SIZE).take(10))
+
+
 @pytest.mark.parametrize("text", ["counts", "voxel:2", "time-surface:30ms", "sae"])
 def test_polarities_have_their_colours(text: str) -> None:
     many = 40
