@@ -114,6 +114,20 @@ def test_what_a_batch_refuses_no_clip_has_seen() -> None:
             np.testing.assert_array_equal(a.t, b.t)
 
 
+def test_a_batch_is_renewed_by_as_many_sensors_or_stays_what_it_was() -> None:
+    light, t_ns = light_of(3, clips=2)
+    plain, tried = (DvsBatch([DvsSpec()] * 2, SIZE, [1, 2]) for _ in range(2))
+    for batch in (plain, tried):
+        batch.restart(light[0], t_ns[0])
+    for many in (1, 3):
+        with pytest.raises(UsageError, match="for a batch of 2 sensors: expected as many"):
+            tried.renew([DvsSpec()] * many, range(many))
+    ours, theirs = (batch.steps(light[1:], t_ns[1:]) for batch in (tried, plain))
+    for k in range(2):
+        for a, b in zip(ours.of(k), theirs.of(k), strict=True):
+            np.testing.assert_array_equal(a.t, b.t)
+
+
 def test_a_batch_fills_a_grid_of_each_clip() -> None:
     light, t_ns = light_of(4, clips=2)
     batch = DvsBatch([DvsSpec()] * 2, SIZE, [1, 2])

@@ -68,9 +68,15 @@ class DvsBatch:
         self._tiles = Tiles(len(self._sensors), threads)
 
     def renew(self, specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None = None) -> None:
-        """Become other sensors, as many as before and without light yet, in the same arrays (`Dvs.renew`)."""
-        others = zip(self._sensors, specs, seeds, cameras_of(specs, seeds, cameras), strict=True)
-        for sensor, spec, seed, camera in others:
+        """Become other sensors, as many as before and without light yet, in the same arrays (`Dvs.renew`).
+
+        Raises UsageError for another number of them, which changes nothing.
+        """
+        cameras = cameras_of(specs, seeds, cameras)
+        if len(specs) != len(self._sensors):
+            given, there = counted(len(specs), "spec"), counted(len(self._sensors), "sensor")
+            raise UsageError(f"{given} for a batch of {there}: expected as many; make another batch")
+        for sensor, spec, seed, camera in zip(self._sensors, specs, seeds, cameras, strict=True):
             sensor.renew(spec, seed, camera)
 
     def restart(self, light: np.ndarray, t_ns: Sequence[int]) -> None:
