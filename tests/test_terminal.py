@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 from itertools import pairwise
 
@@ -48,6 +49,22 @@ def test_a_log_has_lines_of_long_work(monkeypatch):
 
 def test_a_log_has_none_of_short_work(monkeypatch):
     assert logged(monkeypatch, 99, 0.1) == []
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_nothing_is_said_of_an_end_that_is_not_known(monkeypatch, is_terminal):
+    clock, shown = Clock(monkeypatch), io.StringIO()
+    monkeypatch.setattr(shown, "isatty", lambda: is_terminal)
+    monkeypatch.setattr(sys, "stderr", shown)
+    with bar_of(False, STEPS, disable=False) as bar:
+        clock.now_s += 100.0
+        bar.update(3)
+        bar.refresh()
+        assert shown.getvalue().split("\r")[-1].strip() == "step 3"
+        clock.now_s += 100.0
+        bar.total = 6
+        bar.refresh()
+        assert re.match(r"50%.* step 3/6, .* left$", re.split("[\r\n]", shown.getvalue().strip())[-1].strip())
 
 
 def test_nothing_is_said_of_quiet_work(monkeypatch):

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from typing import TYPE_CHECKING, Any, TextIO
 
 from vid2ev.errors import plain
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 NAME = 10  # width of the names
 COMPILING = "compiling kernels, once"  # it takes seconds to minutes
+BAR = re.compile(r" {bar(:\d+)?}")
+END = re.compile(r"{percentage[^}]*}% (?:{bar[^}]*} )?|/{total_fmt}|, {remaining} left")  # what is said of an end
 SELDOM_S, MORE = 10.0, 0.1  # between lines of a log at least, and of the time that is gone
 
 
@@ -33,15 +36,28 @@ def counted(count: int, name: str) -> str:
 
 def bar_of(quiet: bool, bar_format: str, **look: Any) -> tqdm:
     """A progress bar on a terminal; where that is none, as in the log of a cluster, a line of the same now and then.
-    Neither with TQDM_DISABLE=1 in the environment."""
+    Neither with TQDM_DISABLE=1 in the environment.  As long as there is no `total`, nothing is said of the end."""
+    bars = _bars()
+    if quiet or sys.stderr is None:
+        return bars(disable=True)
+    if sys.stderr.isatty():
+        return bars(bar_format=bar_format, leave=False, **look)
+    return bars(bar_format=BAR.sub("", bar_format), leave=False, file=Log(sys.stderr), mininterval=1.0, **look)
+
+
+@cache
+def _bars() -> type[tqdm]:
     from tqdm import tqdm
 
-    if quiet or sys.stderr is None:
-        return tqdm(disable=True)
-    if sys.stderr.isatty():
-        return tqdm(bar_format=bar_format, leave=False, **look)
-    told = re.sub(r" {bar(:\d+)?}", "", bar_format)
-    return tqdm(bar_format=told, leave=False, file=Log(sys.stderr), mininterval=1.0, **look)
+    class Bar(tqdm):
+        """(tqdm says that no time is left where it does not know how much there is to do.)"""
+
+        @property
+        def format_dict(self) -> Any:
+            facts = super().format_dict
+            return facts if facts["total"] else facts | {"bar_format": END.sub("", facts["bar_format"])}
+
+    return Bar
 
 
 class Log:

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
 STEPS = "{percentage:3.0f}% {bar} step {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
-UNKNOWN = "step {n_fmt}, {elapsed} gone{postfix}"
 SMOOTHING = 0.05  # of the newest step, in loss and speed
 
 
@@ -66,8 +65,8 @@ class Bar(Callback):
         total = None if trainer.max_steps == -1 else trainer.max_steps
         if self._shown is None:
             first = trainer.global_step - 1
-            self._shown = bar_of(self.quiet, UNKNOWN, initial=first, total=total)
-        self._shown.total, self._shown.bar_format = total, UNKNOWN if total is None else STEPS
+            self._shown = bar_of(self.quiet, STEPS, initial=first)
+        self._shown.total = total
         skipped = f", {module.skipped} skipped" if module.skipped else ""
         self._shown.set_postfix_str(f"loss {self._loss:.4f}, {speed:.3g} samples/s{skipped}", refresh=False)
         self._shown.update(trainer.global_step - self._shown.n)
