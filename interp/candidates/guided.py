@@ -26,13 +26,13 @@ finer.  So F and e are of luminance averaged alike, and c^2 in j^2 = e^2 - c^2 o
 itself knows what C does not show.  What is taken over so many pixels is over k times as many, a is a / sqrt(k), and it
 is done twice: the second time motion is to I in place of C (`sight.py`).
 
-Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +4.0 dB and +0.045 with a clean sensor, +3.6 dB and
-+0.064 with a noisy one; 32 parts of eight real videos +1.8 dB and +0.011, +10.7 dB and +0.12; the worst part 0 and +1.7
-dB.  With c^2 of means around alone noisy real videos are 1.8 dB worse (k = 3: 0.8), and all else is alike.  With
-bilinear light in place of cubic 0.1 to 0.2 dB less, up to 1.1 where texture is fine and fast.  Without D the worst part
-is -0.2 dB, two videos whose motion is even lose 0.2 and 0.3 dB, with noise 0.4, and others gain 0.1 or lose up to 0.2.
-With m = 4/5 exp(-a e), whatever the doubt, scenes are 0.4 dB worse, real videos 0 and 2.2 dB.  With k = 2 the scenes
-are +2.8 and +2.6 dB, the parts +1.5 and +8.5 dB; with k = 4 the scenes +1.7 and +1.6 dB.
+Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +5.0 dB and +0.049 with a clean sensor, +4.5 dB and
++0.070 with a noisy one; 32 parts of eight real videos +2.1 dB and +0.013, +11.0 dB and +0.12; the worst part 0 and +2.6
+dB.  With k = 2 the scenes are +3.1 and +2.9 dB, the parts +1.6 and +8.2 dB; with k = 4 the scenes +1.9 and +1.7 dB.
+With c^2 of means around alone noisy real videos are 1.8 dB worse (k = 3: 0.8), and all else is alike.  With bilinear
+light in place of cubic 0.1 to 0.2 dB less, up to 1.1 where texture is fine and fast.  Without D the worst part is -0.2
+dB, two videos whose motion is even lose 0.2 and 0.3 dB, with noise 0.4, and others gain 0.1 or lose up to 0.2.  With
+m = 4/5 exp(-a e), whatever the doubt, scenes are 0.4 dB worse, real videos 0 and 2.2 dB.
 
 A mix of J0 and D that is nearest to C (least squares, over 9 to 65 px) gains up to 0.4 dB more where motion is even,
 and loses 0.1 to 0.2 dB in scenes and up to 0.8 in parts where something small is fast.  Motion that is even along its

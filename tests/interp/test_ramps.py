@@ -36,15 +36,16 @@ def slowly(off_on: np.ndarray, contrast: tuple[float, float], t: float) -> tuple
         off, on = (int(each) for each in off_on[:, s])
         each = (contrast[1] * on - contrast[0] * off) / max(on + off, 1)
         events += [((s + 0.5) / steps, each)] * (on + off)
-    change = number = last = 0.0
+    change = number = last = came = 0.0
     for k, (at, nats) in enumerate(events):
         v = 0.5 if k == 0 else 1.0
         if at <= t:
-            change, number, last = change + v * nats, number + v, at
+            change, number, last, came = change + v * nats, number + v, at, nats
             continue
         way = (t - last) / (at - last)
-        gone = way**2 if k == 0 else way
-        return change + gone * v * nats, number + gone * v
+        turns = came * nats < 0
+        gone = way**2 if k == 0 or turns else way
+        return change + gone * v * nats + turns * 3 * way * (1 - way) * came, number + gone * v
     if not events:
         return 0.0, 0.0
     after = 0.5 * (1 - ((1 - t) / (1 - last)) ** 2)
@@ -110,7 +111,8 @@ def test_doubt_is_what_is_missed_where_half_of_it_may_have_come() -> None:
 def test_backwards_in_time_it_is_the_same(seed: int, t: float) -> None:
     """Of light that only rises, or falls: what has risen until t is then left of what falls.
 
-    (Light that turns goes a whole threshold back to the level before, forwards and backwards not the same one.)
+    (Light that turns goes a whole threshold back to the level before, forwards and backwards not the same one, and goes
+    beyond the last one before it turned.)
     """
     draw = np.random.default_rng(seed)
     falls = torch.from_numpy(draw.random((3, 4)) < 0.5)
@@ -141,10 +143,47 @@ def test_light_that_changes_slowly_is_neither_ahead_nor_behind(thresholds: float
     torch.testing.assert_close(off, -off.flip(0), atol=0.02 * C, rtol=0)  # as much ahead as behind
 
 
+def seen(light: np.ndarray, memory: float, steps: int) -> np.ndarray:
+    """Events [2, steps] of light in thresholds, from a memory on."""
+    off_on, each = np.zeros((2, steps)), (len(light) - 1) // steps
+    for k, level in enumerate(light[1:]):
+        while abs(level - memory) >= 1:
+            rises = level > memory
+            memory += 1 if rises else -1
+            off_on[int(rises), k // each] += 1
+    return off_on
+
+
+@pytest.mark.parametrize("cycles", [1, 2])
+@pytest.mark.parametrize("thresholds", [2.5, 4.1])
+def test_light_that_turns_goes_on_before_it_comes_back(thresholds: float, cycles: int) -> None:
+    """Over all phases of the levels: the mean is the truth to a fifth of a threshold (it was nearly a whole one)."""
+    steps, phases = 128, 50
+    moments = np.linspace(0, 1, 8 * steps + 1)
+    light = thresholds * (1 - np.cos(2 * np.pi * cycles * moments)) / 2
+    off_on = np.stack([seen(light, -(phase + 0.5) / phases, steps) for phase in range(phases)], -1)
+    times = torch.linspace(0.02, 0.98, 25)[None]
+    found = risen(EventCounts(torch.from_numpy(off_on)[None, :, :, None], torch.full((1, 2), C)), times)
+    zero = torch.zeros(1, 1, 1, 1, phases)
+    made = found.change + found.drift(times) * found.missed(zero, zero)
+    truth = torch.from_numpy(np.interp(times[0], moments, light)) * C
+    assert float((made.mean((0, 2, 3, 4)) - truth).abs().max()) < 0.2 * C
+
+
+@pytest.mark.parametrize("steps", [5, 16])
+def test_what_comes_back_is_none_of_what_has_changed_in_the_end(steps: int) -> None:
+    counts = EventCounts(torch.randint(0, 3, (1, 2, steps, 6, 7)), torch.full((1, 2), C))
+    middles = (torch.arange(steps)[None] + 0.5) / steps
+    found = risen(counts, torch.cat([torch.tensor([[0.0, 1.0]]), middles], 1))
+    assert float(found.beyond[:, :2].abs().max()) == 0
+    assert float(found.beyond.abs().max()) <= 0.75 * C + 1e-6  # (3 f (1 - f), where nothing is beyond a threshold)
+    torch.testing.assert_close(found.left[:, 1], torch.zeros(1, 1, 6, 7), atol=1e-5, rtol=0)
+
+
 def test_networks_are_given_thirds_of_usual_events_and_half_the_log_of_their_number() -> None:
     """In this order and these units the weights that come with the package have learnt them."""
-    change, left, number, more = torch.randn(4, 1, 2, 1, 3, 5)
-    found = Risen(change, left, number.abs(), more.abs()).channels()
+    change, left, number, more, beyond = torch.randn(5, 1, 2, 1, 3, 5)
+    found = Risen(change, left, number.abs(), more.abs(), beyond).channels()
     expected = [change / 0.45, left / 0.45, torch.log(1 + number.abs()) / 2, torch.log(1 + more.abs()) / 2]
     torch.testing.assert_close(found, torch.cat(expected, 2))
 
