@@ -128,6 +128,17 @@ def test_motion_is_that_of_light_by_the_curve_of_the_codes() -> None:
     assert not conditions_of(faint)["motion_px"] > 0
 
 
+def test_light_is_that_of_red_green_and_blue_in_this_order() -> None:
+    """Of red and green the contrast is that of their shares; a texture that moves in blue alone is hardly seen."""
+    true = np.zeros((4, 6, 3), np.uint8)
+    true[:, :3, 0] = true[:, 3:, 1] = 255
+    assert contrast_of(true) == pytest.approx(math.log((0.7152 + 1e-3) / (0.2126 + 1e-3)) / 2, rel=1e-3)
+    group = moved(8)
+    group.keys[..., 2] = 0.8 * group.keys[..., 2]
+    group.keys[..., :2] = 255
+    assert conditions_of(group)["motion_px"] == 0
+
+
 def test_events_are_counted_for_each_pixel_of_their_own_camera() -> None:
     group = moved(8)
     counts = EventCounts.none(1, (24, 32), 4)
