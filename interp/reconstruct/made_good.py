@@ -13,7 +13,7 @@ import numpy as np
 from interp.reconstruct.reconstructor import Reconstructor
 from interp.representation.dead_time import DeadTime
 from vid2ev import Events
-from vid2ev.views.representation import check_within
+from vid2ev.stream.events import check_within
 
 NONE = -1  # in place of a sign, where a pixel has sent nothing yet
 

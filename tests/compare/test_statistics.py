@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from event_streams import busy, events_of, streams
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vid2ev.compare.comparison import compare
 from vid2ev.compare.statistics import EDGES_US, Statistics, statistics_of
 from vid2ev.formats import read_events
 from vid2ev.stream.events import Events
@@ -137,6 +139,16 @@ def test_one_event_and_none() -> None:
 def test_events_outside_of_the_sensor_are_refused(events: Events) -> None:
     with pytest.raises(ValueError, match="outside"):
         statistics_of([events], SIZE)
+
+
+@pytest.mark.parametrize("name", ["t", "x", "y", "p"])
+def test_events_in_arrays_of_other_lengths_are_refused(name: str) -> None:
+    """(Compiled code would read beyond the end of one of them.)"""
+    events = events_of([3, 4])
+    short = replace(events, **{name: getattr(events, name)[:1]})
+    for made in (lambda: statistics_of([short], SIZE), lambda: compare(events, short, SIZE)):
+        with pytest.raises(ValueError, match="expected one length"):
+            made()
 
 
 def test_events_out_of_order_are_refused() -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from vid2ev import Cis, CisSpec, Dvs, DvsSpec, UsageError, events_of, load_cis, load_sensor
+from vid2ev.sensors.batch import DvsBatch
+from vid2ev.views.grid import NetCounts
 
 
 @pytest.mark.parametrize(
@@ -144,10 +146,42 @@ def test_what_is_no_state_of_the_sensor_is_refused() -> None:
                 sensor.restore({other: array for other, array in state.items() if other != name})
 
 
-@pytest.mark.parametrize("pixels", [[-1], [4], [0.0], ["a"]])
+@pytest.mark.parametrize("pixels", [[-1], [4], [0.0], ["a"], 1, [[0, 1]]])
 def test_nobody_looks_into_pixels_that_are_not_there(pixels: Any) -> None:
     dvs = Dvs(DvsSpec(), (2, 2))
     dvs.step(np.zeros((2, 2)), 0)
     assert len(dvs.inside([0, 3]).signal) == 2  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="expected whole numbers from 0 to 3"):
+    with pytest.raises(UsageError, match="expected a list of whole numbers from 0 to 3"):
         dvs.inside(pixels)
+
+
+@pytest.mark.parametrize(
+    ("light", "sentence"),
+    [
+        ([np.zeros((2, 2)), np.zeros((1, 2))], r"shapes \(1, 2\), \(2, 2\): expected \(2, 2\) of each"),
+        (np.zeros((2, 2)), r"shape \(2, 2\): expected \(frames, 2, 2\)"),
+        (1.0, r"shape \(\): expected \(frames, 2, 2\)"),
+        ([], r"shape \(0,\): expected \(frames, 2, 2\)"),
+        (np.zeros((2, 3, 2)), r"shape \(3, 2\): expected \(2, 2\)"),
+    ],
+)
+def test_frames_of_light_are_all_of_one_shape(light: Any, sentence: str) -> None:
+    dvs = Dvs(DvsSpec(), (2, 2))
+    for step in (lambda: dvs.steps(light, [0, 1]), lambda: dvs.fill(NetCounts((2, 2), [0, 1]), light, [0, 1])):
+        with pytest.raises(UsageError, match=sentence):
+            step()
+    assert not dvs.state()
+
+
+@pytest.mark.parametrize(
+    ("specs", "seeds", "cameras", "sentence"),
+    [
+        (DvsSpec(), [1], None, "^specs of type DvsSpec: expected a list"),
+        ([DvsSpec()], 1, None, "^seeds of type int: expected a list"),
+        ([DvsSpec()], None, None, "^seeds of type NoneType: expected a list"),
+        ([DvsSpec()], [1], 0, "^cameras of type int: expected a list"),
+    ],
+)
+def test_a_batch_takes_lists(specs: Any, seeds: Any, cameras: Any, sentence: str) -> None:
+    with pytest.raises(UsageError, match=sentence):
+        DvsBatch(specs, (2, 2), seeds, cameras=cameras)

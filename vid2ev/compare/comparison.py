@@ -22,7 +22,7 @@ import numpy as np
 from vid2ev.compare.by_pixel import ByPixel, by_pixel
 from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
 from vid2ev.compare.matching import WINDOW_US, match
-from vid2ev.stream.events import Events
+from vid2ev.stream.events import Events, check_within
 from vid2ev.terminal import counted
 
 BINS = 100  # parts of the time for which the distance is kept
@@ -145,15 +145,16 @@ def compare(
 ) -> Comparison:
     """Compare events with those of a reference, both in order of time, of a sensor of `size` (width, height).
 
-    Raises ValueError for events out of order of time, later or earlier than `LATEST_US` or outside of the sensor.
+    Raises ValueError for events out of order of time, later or earlier than `LATEST_US`, outside of the sensor, or in
+    arrays of other lengths.
     """
+    for side in (events, reference):
+        check_within(side, size)
     ends = [t for side in (events, reference) if len(side) for t in (int(side.t[0]), int(side.t[-1]))]
     if max(map(abs, ends), default=0) > LATEST_US:
         raise ValueError(f"events from {min(ends)} to {max(ends)} us: expected times within {LATEST_US} us")
     tally = Tally(size, (min(ends, default=0), max(ends, default=0)), taus_us=taus_us, window_us=window_us)
     rows = range(size[1])
-    if any(len(side) and int(side.y.max()) >= size[1] for side in (events, reference)):
-        raise ValueError(f"events outside of {size[0]}x{size[1]} pixels")
     tally.add(by_pixel([events], size[0], rows), by_pixel([reference], size[0], rows), rows)
     return tally.comparison()
 

@@ -29,7 +29,7 @@ import numpy as np
 
 from vid2ev.compare.comparison import percentile
 from vid2ev.compiling.cache import cached
-from vid2ev.stream.events import Events
+from vid2ev.stream.events import Events, check_within
 from vid2ev.terminal import counted
 
 NEIGHBOUR_US = 5000
@@ -148,14 +148,13 @@ class Gathering:
         self._ends_us: tuple[int, int] | None = None
 
     def add(self, events: Events) -> None:
-        """The next events.  Raises ValueError for events out of order of time or outside of the sensor."""
+        """The next events.  Raises ValueError for events out of order of time or outside of the sensor, or in
+        arrays of other lengths."""
+        check_within(events, self._size)
         if not len(events):
             return
         if np.any(events.t[1:] < events.t[:-1]) or (self._ends_us is not None and events.t[0] < self._ends_us[1]):
             raise ValueError("events out of order of time")
-        width, height = self._size
-        if int(events.x.max()) >= width or int(events.y.max()) >= height:
-            raise ValueError(f"events outside of {width}x{height} pixels")
         first_us = int(events.t[0]) if self._ends_us is None else self._ends_us[0]
         self._ends_us = first_us, int(events.t[-1])
         _gather(

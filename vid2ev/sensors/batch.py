@@ -120,7 +120,12 @@ class DvsBatch:
 def cameras_of(specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None) -> Sequence[int]:
     """The numbers of the cameras of a batch.  Raises UsageError for one without sensors, and for other numbers of seeds
     or cameras than of these."""
-    cameras = cameras if cameras is not None else [0] * len(specs)
+    cameras = cameras if cameras is not None or not isinstance(specs, Sequence) else [0] * len(specs)
+    for name, values in (("specs", specs), ("seeds", seeds), ("cameras", cameras)):
+        if not isinstance(values, Sequence | np.ndarray):
+            raise UsageError(
+                f"{name} of type {type(values).__name__}: expected a list, with one for each sensor of the batch"
+            )
     if not specs or not len(specs) == len(seeds) == len(cameras):
         given = f"{counted(len(specs), 'spec')}, {counted(len(seeds), 'seed')} and {counted(len(cameras), 'camera')}"
         raise UsageError(f"a batch of {given}: expected one of each for every sensor, and at least one")

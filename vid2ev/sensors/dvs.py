@@ -121,7 +121,7 @@ class Dvs:
         Faster than that: some frames go through the walk at a time.  Raises UsageError as `step` does, and for another
         number of times than of frames; then none of them has been seen.
         """
-        return self.steps_of(np.asarray(light)[:, None], 0, t_ns)
+        return self.steps_of(self._intake.frames(light)[:, None], 0, t_ns)
 
     def steps_of(self, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> list[Events]:
         """`steps` of one of the clips of light [frames, clips, height, width]."""
@@ -146,7 +146,7 @@ class Dvs:
 
         The grid has then what it would have of the events of `steps`, to the bit.
         """
-        self.fill_of(grid, np.asarray(light)[:, None], 0, t_ns)
+        self.fill_of(grid, self._intake.frames(light)[:, None], 0, t_ns)
 
     def fill_of(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> None:
         """`fill` of one of the clips of light [frames, clips, height, width]."""
@@ -236,11 +236,11 @@ class Dvs:
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`).
 
-        Raises UsageError for pixels that this sensor does not have.
+        Raises UsageError for pixels that this sensor does not have, and for what is no list of them.
         """
         pixels, count = np.asarray(pixels), self.size[0] * self.size[1]
-        if pixels.dtype.kind not in "iu" or np.any((pixels < 0) | (pixels >= count)):
-            raise UsageError(f"pixels {pixels}: expected whole numbers from 0 to {count - 1}, y * width + x")
+        if pixels.ndim != 1 or pixels.dtype.kind not in "iu" or np.any((pixels < 0) | (pixels >= count)):
+            raise UsageError(f"pixels {pixels}: expected a list of whole numbers from 0 to {count - 1}, y * width + x")
         leak_nat = self._pixels.numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
         return self._pixels.inside(pixels, leak_nat)
 

@@ -30,6 +30,21 @@ class Intake:
                 f"light of shape {tuple(shape)}: expected ({height}, {width}), rows and columns of this sensor"
             )
 
+    def frames(self, light: Any) -> np.ndarray:
+        """Frames of light as an array [frames, height, width]."""
+        width, height = self.size
+        try:
+            light = np.asarray(light)
+        except ValueError as error:  # (of NumPy, which takes a list of arrays of one shape)
+            shapes = ", ".join(str(shape) for shape in sorted({np.shape(frame) for frame in light}))
+            raise UsageError(f"frames of light of shapes {shapes}: expected ({height}, {width}) of each") from error
+        if light.ndim != 3:
+            raise UsageError(
+                f"light of shape {light.shape}: expected (frames, {height}, {width}), rows and columns of this sensor"
+            )
+        self.check(light.shape[1:])
+        return light
+
     def flat(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Light [..., height, width] as [frames, pixels], with the table of its codes; raises UsageError."""
         light = np.asarray(light)

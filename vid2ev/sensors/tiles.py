@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeVar
 
 from vid2ev.errors import UsageError
 from vid2ev.interrupts import found_again
+from vid2ev.requests import is_whole
 
 R = TypeVar("R")
 
@@ -34,8 +35,12 @@ class Tiles:
     """
 
     def __init__(self, blocks: int, threads: int, part: Part = WHOLE):
-        if not 0 <= part.number < part.parts <= blocks:
-            raise UsageError(f"part {part.number} of {part.parts}: expected one from 0 on, of {blocks} at most")
+        known = isinstance(part, Part) and is_whole(part.parts, 1, blocks) and is_whole(part.number, 0, part.parts - 1)
+        if not known:
+            raise UsageError(
+                f"part {part!r}: expected Part(number, parts), a number from 0 on, of {blocks} parts at most;"
+                " leave it out for all pixels"
+            )
         first, last = part.within(blocks)
         self.count = min(threads, last - first)
         self._cuts = [first + (last - first) * k // self.count for k in range(self.count + 1)]

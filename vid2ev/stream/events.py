@@ -75,3 +75,15 @@ class Events:
         """The events at a boolean mask or an index array."""
         label = None if self.label is None else self.label[mask]
         return Events(self.t[mask], self.x[mask], self.y[mask], self.p[mask], label)
+
+
+def check_within(events: Events, size: tuple[int, int]) -> None:
+    """Raise ValueError for events outside of a sensor, or in arrays of other lengths: compiled code does not look."""
+    lengths = [len(each) for each in (events.t, events.x, events.y, events.p)]
+    if len(set(lengths)) > 1:
+        raise ValueError(
+            f"events with t, x, y, p of lengths {lengths}: expected one length; select the same events of each"
+        )
+    x, y = events.x, events.y
+    if len(events) and (x.max() >= size[0] or y.max() >= size[1] or min(x.min(), y.min()) < 0):
+        raise ValueError(f"events outside of the {size[0]}x{size[1]} sensor")

@@ -14,8 +14,7 @@ import numpy as np
 
 from vid2ev.compiling.cache import cached
 from vid2ev.pictures.colours import MOST, event_colours, in_8_bits
-from vid2ev.stream.events import Events
-from vid2ev.views.representation import check_within
+from vid2ev.stream.events import Events, check_within
 
 COLOURS = in_8_bits(event_colours())
 

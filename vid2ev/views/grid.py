@@ -21,8 +21,7 @@ import numpy as np
 
 from vid2ev.compiling.cache import cached
 from vid2ev.errors import UsageError
-from vid2ev.stream.events import Events
-from vid2ev.views.representation import check_within
+from vid2ev.stream.events import Events, check_within
 from vid2ev.views.requests import parse_representation
 
 if TYPE_CHECKING:

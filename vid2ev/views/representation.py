@@ -69,18 +69,5 @@ def slices_of(recording: Recording, slicing: Slicing) -> Iterator[Slice]:
             count = 0
 
 
-def check_within(events: Events, size: tuple[int, int]) -> None:
-    """Raise ValueError for events outside of a sensor, or in arrays of other lengths: compiled code does not look."""
-    lengths = [len(each) for each in (events.t, events.x, events.y, events.p)]
-    if len(set(lengths)) > 1:
-        raise ValueError(
-            f"events with t, x, y, p of lengths {lengths}: expected one length; select the same events of each"
-        )
-    if len(events) and (
-        events.x.max() >= size[0] or events.y.max() >= size[1] or min(events.x.min(), events.y.min()) < 0
-    ):
-        raise ValueError(f"events outside of the {size[0]}x{size[1]} sensor")
-
-
 def _slice(piece: Piece, count: int) -> Slice:
     return Slice(piece.start_us, piece.stop_us, count)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.cache import cached
-from vid2ev.stream.events import Events
-from vid2ev.views.representation import check_within
+from vid2ev.stream.events import Events, check_within
 
 
 class Squares:

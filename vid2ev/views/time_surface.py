@@ -18,8 +18,7 @@ import numpy as np
 
 from vid2ev.compiling.cache import cached
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
-from vid2ev.stream.events import Events
-from vid2ev.views.representation import check_within
+from vid2ev.stream.events import Events, check_within
 
 NEVER = np.iinfo(np.int64).min
 TAU_US = 30_000.0

@@ -21,8 +21,7 @@ import numpy as np
 
 from vid2ev.compiling.cache import cached
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits, strength
-from vid2ev.stream.events import Events
-from vid2ev.views.representation import check_within
+from vid2ev.stream.events import Events, check_within
 
 MOST_BINS = 1000
 STEPS = 16  # of a picture's values per event
